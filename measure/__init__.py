@@ -6,12 +6,11 @@ ice_vision.check(__file__, "scenes", "imaging")
 
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
-from measure.bounds import bound, image_bound
+from measure.bounds import bound
 from measure.correction import Correction, Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
 from measure.estimators.registry import best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
-from measure.features.relations import line_angle, point_distance
 from measure.find.candidate import Candidate
 from measure.find.ellipse import find_ellipse
 from measure.find.search import find
@@ -19,7 +18,7 @@ from measure.fitting.fit import fit
 from measure.fitting.result import Fit
 from measure.measurands import Measurements, corrected, measure, measure_by
 from measure.measurement import Measurement, distance, distances
-from measure.photo.lens import Lens, load_lens
+from measure.photo.lens import Intrinsics, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.photograph import MeasuredShape, Shapes, photograph
@@ -38,7 +37,7 @@ __all__ = [
     "EstimatorKind",
     "Fit",
     "Images",
-    "Lens",
+    "Intrinsics",
     "MeasuredShape",
     "MeasuredValue",
     "Measurement",
@@ -60,8 +59,6 @@ __all__ = [
     "find_ellipse",
     "fit",
     "fit_ellipse",
-    "image_bound",
-    "line_angle",
     "load_lens",
     "measure",
     "measure_by",
@@ -69,7 +66,6 @@ __all__ = [
     "mtf",
     "noise_curve",
     "photograph",
-    "point_distance",
     "propagate",
     "region_of_interest",
 ]

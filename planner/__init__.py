@@ -13,15 +13,15 @@ from imaging.features.projected_edges import projected_edges
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
 from planner.combining import Combination, combine
+from planner.constraints import Constraints
 from planner.covering import Coverage, coverage
+from planner.design import Choice, Chosen, Varied, with_choice
 from planner.forecast import Forecast
 from planner.maps import Map, pose_map, variance_map
 from planner.planning import NothingMeasuresAll, Plan, plan
 from planner.prediction import EdgePrediction, Prediction, predict, variances
 from planner.robustness import Robust, Tolerances, robust
 from planner.search.candidates import Candidate
-from planner.search.constraints import Constraints
-from planner.search.design import Choice, Chosen, Varied, with_choice
 from planner.search.exhaustive import exhaustive
 from planner.search.grid import ViewingSpace
 from planner.search.objective import Aim

@@ -10,14 +10,13 @@ import numpy as np
 
 from imaging.geometry.projection import direction
 from imaging.models import DEFAULT_MODEL, ModelName
+from planner.constraints import Constraints
 from planner.forecast import mildest
 from planner.prediction import Prediction, predict
-from planner.search.candidates import DEAREST
-from planner.search.constraints import Constraints
+from planner.search.candidates import DEAREST, rounded
 from planner.search.grid import Grid, as_poses
 from planner.search.objective import Aim, Report, SearchProblem
 from planner.search.sets import fast_table, information
-from planner.search.setting_up import rounded
 from scenes import InvalidInput, Pose, Scene
 from scenes.results import Shown, finite, poses
 from scenes.status import is_trusted

@@ -10,14 +10,14 @@ import numpy as np
 
 from imaging.features.measurand import required_edges
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
+from planner.constraints import Constraints
+from planner.design import DEFAULT_HOLD, Hold, Varied, Vary, check_vary
 from planner.prediction import Prediction
-from planner.search.candidates import Candidate, RayTraced, Searched, candidates, trusted
-from planner.search.constraints import Constraints
-from planner.search.design import DEFAULT_HOLD, Hold, Varied, Vary, check_vary
+from planner.search.candidates import Candidate, RayTraced, Searched, SettingUp, candidates, trusted
 from planner.search.exhaustive import has_bound
 from planner.search.grid import Grid, as_array, as_poses
 from planner.search.lights import Mixture, applies, shares_of, with_shares
-from planner.search.local import Step, refine
+from planner.search.local import SearchStep, refine
 from planner.search.objective import (
     DEFAULT_OBJECTIVE,
     DEFAULT_OVER,
@@ -28,7 +28,6 @@ from planner.search.objective import (
     SearchProblem,
     check_choice,
 )
-from planner.search.setting_up import SettingUp
 from planner.search.varying import Variation
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.results import Shown, finite, poses
@@ -72,7 +71,7 @@ class Plan(Shown):
         The best pair of the grid.
     prediction : Prediction
         At the poses, in both units.
-    trace : tuple of Step
+    trace : tuple of SearchStep
         Of the alternating search.
     partial_variance : float
         Where the alternating search stopped.
@@ -108,7 +107,7 @@ class Plan(Shown):
     grid_light: Pose | tuple[Pose, ...]
     grid_variance: float
     prediction: Prediction
-    trace: tuple[Step, ...]
+    trace: tuple[SearchStep, ...]
     partial_variance: float
     gap: float | None
     guarantee: str

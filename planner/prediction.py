@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -292,10 +291,10 @@ def _looked_at(picture: Picture, roughly: bool) -> Pictures:
     return pictures.once("roughly", lambda: replace(pictures, roughly=True, _known={})) if roughly else pictures
 
 
-@lru_cache(maxsize=16)
 def glanced(picture: Picture) -> Pictures:
     """One picture to be glanced at, as the search does with many; one object for equal pictures."""
-    return replace(Pictures.of(picture), closely=False, _known={})
+    pictures = Pictures.of(picture)
+    return pictures.once("glanced", lambda: replace(pictures, closely=False, _known={}))
 
 
 def _of_locator(pictures: Pictures, model: str) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:

@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 
 from imaging.geometry.projection import direction
+from planner.constraints import Constraints
 from planner.planning import Plan
-from planner.search.constraints import Constraints
 from planner.search.local import refine, shifted
 from planner.search.objective import Aim, SearchProblem
 from scenes import InvalidInput, Material, Pose, Scene

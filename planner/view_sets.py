@@ -54,7 +54,7 @@ class ViewSet:
         quantity cannot be measured anywhere, or what is shared is not free.
     hard : tuple of str
         Names of the quantities that every picture of the set that tells them cannot measure around its poses
-        (`planner.search.setting_up`): they are hard to set up.
+        (`planner.search.candidates`): they are hard to set up.
     """
 
     views: tuple[View, ...]

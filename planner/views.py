@@ -10,14 +10,15 @@ import numpy as np
 
 from imaging.models import DEFAULT_MODEL, ModelName
 from planner.combining import Combination, combine
+from planner.constraints import Constraints
 from planner.planning import COARSE_STEP
-from planner.search.constraints import Constraints
+from planner.search.candidates import SettingUp
 from planner.search.exhaustive import has_bound
 from planner.search.grid import Grid
 from planner.search.objective import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over, Report, SearchProblem
 from planner.search.sets import (
     MOST_SETS,
-    Information,
+    PictureInformation,
     Pool,
     all_ok,
     alone,
@@ -30,7 +31,6 @@ from planner.search.sets import (
     undominated,
     undominated_shared,
 )
-from planner.search.setting_up import SettingUp
 from planner.view_sets import View, Views, ViewSet
 from scenes import InvalidInput, Pose, Quantity, Scene
 
@@ -149,7 +149,9 @@ def _pool(
     return pool, None if share is None else s if share == "sensor" else k
 
 
-def _chosen(table: Information, rows: np.ndarray, groups: np.ndarray | None, count: int) -> tuple[tuple[int, ...], ...]:
+def _chosen(
+    table: PictureInformation, rows: np.ndarray, groups: np.ndarray | None, count: int
+) -> tuple[tuple[int, ...], ...]:
     """For 1 to ``count`` pictures the best sets of some rows of a table, those of one group where there are groups."""
     best: list[tuple] = []
     for _, own in _grouped(rows, groups):
@@ -244,7 +246,7 @@ def _hard(quantities: tuple[Quantity, ...], combination: Combination, steady: li
     return tuple(each.name for each, used, is_firm in told if used and not is_firm)
 
 
-def _exhaustive(table: Information, rows: np.ndarray, groups: np.ndarray | None, count: int) -> float | None:
+def _exhaustive(table: PictureInformation, rows: np.ndarray, groups: np.ndarray | None, count: int) -> float | None:
     """What is minimised by the best of all sets of the rows; None where they are too many to try."""
     kept = [own[front(table.only(own))] for _, own in _grouped(rows, groups)]
     if sum(sets_of(len(own), count) for own in kept) > MOST_SETS:

@@ -4,11 +4,11 @@ import ice_vision
 
 ice_vision.check(__file__, "scenes", "imaging")
 
-from render.phenomena import Tolerance, choose, effects
+from render.phenomena import EffectTolerance, choose, effects
 from render.phenomena.pose import shaken
 from render.quality import Quality
 from render.renderer import image
 from render.sensor import expose, variance
 from render.series import shots
 
-__all__ = ["Quality", "Tolerance", "choose", "effects", "expose", "image", "shaken", "shots", "variance"]
+__all__ = ["EffectTolerance", "Quality", "choose", "effects", "expose", "image", "shaken", "shots", "variance"]

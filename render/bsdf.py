@@ -16,7 +16,7 @@ NAME = "ice_brdf"
 _ROUNDING = 1e-6  # of a cosine, in single precision
 
 
-class Lamp(NamedTuple):
+class PolarisedLight(NamedTuple):
     """A polarised light: its place (scene units), its direction of polarisation, and the angle (rad) that it spans."""
 
     at: tuple[float, float, float]
@@ -25,7 +25,7 @@ class Lamp(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Surface:
+class Interaction:
     """What the BSDF needs to know; positions and directions in space, scene units.
 
     ``analyser`` is what the polariser before the sensor at ``sensor`` passes; None without one. Light between two
@@ -38,15 +38,15 @@ class Surface:
     index: tuple[Index, ...]
     sensor: tuple[float, float, float]
     sensor_angle: float
-    lamps: tuple[Lamp, ...] = ()
+    lamps: tuple[PolarisedLight, ...] = ()
     analyser: tuple[float, float, float] | None = None
     texture: Face | None = None
 
 
-_surfaces: list[Surface] = []  # Mitsuba's properties carry numbers only: a BSDF finds its Surface by place
+_surfaces: list[Interaction] = []  # Mitsuba's properties carry numbers only: a BSDF finds its surface by place
 
 
-def describe(mitsuba: Any, surface: Surface) -> dict:
+def describe(mitsuba: Any, surface: Interaction) -> dict:
     """Mitsuba's description of the BSDF for a surface."""
     _register(mitsuba.variant())
     if surface not in _surfaces:

@@ -139,7 +139,7 @@ def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Brdf, 
     analyser = analyser_axis(scene, np.array(list(picture.sensor))) if "analyser" in active else None
     return bsdf.describe(
         mitsuba,
-        bsdf.Surface(
+        bsdf.Interaction(
             material,
             bands(scene, material=material if "wavelength" in active else material.with_dispersion(())),
             tuple(scene.position("sensor", picture.sensor).tolist()),

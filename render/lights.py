@@ -12,7 +12,7 @@ from imaging.light.appearance import analyser_axis, polarisation_axis
 from imaging.light.backlight import passed
 from imaging.light.emitters import reach_of
 from imaging.pictures import Pictures
-from render.bsdf import Lamp
+from render.bsdf import PolarisedLight
 from render.meshes import mesh
 from scenes import Luminaire, Picture, Pose, Scene
 from scenes.lights.luminaire import shining
@@ -39,14 +39,14 @@ def seen(mitsuba: Any, picture: Picture) -> dict:
     return {"light0": _made(mitsuba, described)}
 
 
-def lamps(picture: Picture, active: frozenset[str]) -> tuple[Lamp, ...]:
+def lamps(picture: Picture, active: frozenset[str]) -> tuple[PolarisedLight, ...]:
     """Where polarised lights stand, their directions of polarisation, and the angles (radians) that they span."""
     scene, found = picture.scene, []
     for i, (light, pose) in enumerate(zip(scene.lights, picture.lights, strict=True)):
         at = light_position(scene.camera, light, np.array(list(pose)))
         axis = polarisation_axis(scene, i, at) if "polarisation" in active else None
         if axis is not None:
-            found.append(Lamp(tuple(at.tolist()), tuple(axis.tolist()), 2 * light.half_size / light.distance))
+            found.append(PolarisedLight(tuple(at.tolist()), tuple(axis.tolist()), 2 * light.half_size / light.distance))
     return tuple(found)
 
 

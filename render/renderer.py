@@ -14,7 +14,7 @@ from render import variant as variants
 from render.fine import defocus, fine_image
 from render.optics import blur_and_bin
 from render.parts import parts, within_cone
-from render.phenomena import EFFECTS, Tolerance, choose
+from render.phenomena import EFFECTS, EffectTolerance, choose
 from render.precision import check_precision
 from render.quality import Quality
 from scenes import InvalidInput, Picture, Scene
@@ -27,7 +27,7 @@ def image(
     quality: Quality = Quality(),
     variant: str | None = None,
     effects: str | Iterable[str] = "auto",
-    tolerance: Tolerance = Tolerance(),
+    tolerance: EffectTolerance = EffectTolerance(),
 ) -> np.ndarray:
     """Noise-free image.
 
@@ -43,7 +43,7 @@ def image(
     effects : {"auto", "all"} or iterable of str
         Which effects to simulate: those whose estimated influence exceeds the tolerance, every one, or the named ones
         (see `render.effects`).
-    tolerance : Tolerance
+    tolerance : EffectTolerance
         What ``auto`` may leave out.
 
     Returns

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imaging.contours.quadrics import touching_cone
 from imaging.geometry.projection import camera_frame, sensor_position
 from scenes import Camera, InvalidInput
 from scenes.parts.surfaces import Quadric
@@ -23,6 +22,12 @@ class Ellipse(NamedTuple):
     centre: np.ndarray
     half_axes: tuple[float, float]
     angle: float
+
+
+def touching_cone(quadric: Quadric, eye: np.ndarray) -> np.ndarray:
+    """M, shape (3, 3): d'Md >= 0 for the directions d of lines through the eye (3,) that meet the quadric."""
+    half = quadric.gradient(eye) / 2
+    return np.outer(half, half) - quadric.function(eye) * quadric.form
 
 
 def image_conic(quadric: Quadric, sensor: np.ndarray, camera: Camera) -> np.ndarray:

@@ -11,7 +11,7 @@ from scipy import stats
 
 import measure
 import render
-from render.phenomena import Influence, Tolerance
+from render.phenomena import EffectTolerance, Influence
 from scenes import Picture, Scene, Setting
 
 RENDERED = (
@@ -61,7 +61,7 @@ class Switched:
 
 def check(
     scene: Scene,
-    tolerance: Tolerance = Tolerance(),
+    tolerance: EffectTolerance = EffectTolerance(),
     quality: render.Quality = render.Quality(),
     settings: tuple[Setting, ...] | None = None,
     only: tuple[str, ...] = (*RENDERED, "all"),

@@ -33,7 +33,7 @@ GRADIENT = Method("gradient")  # whose closed form the calibrated model is
 
 
 @dataclass(frozen=True, eq=False)
-class Values:
+class MeasuredValues:
     """What one method measured in n images: M measurands in image and object, NaN for none, and statuses, (n, M)."""
 
     image: np.ndarray
@@ -91,7 +91,7 @@ def remeasured(
     exposures: Iterable[np.ndarray],
     methods: tuple[Method, ...] = (GRADIENT,),
     lap: Callable[[str], None] = lambda name: None,
-) -> tuple[Values, ...]:
+) -> tuple[MeasuredValues, ...]:
     """Measure all exposures of a picture by each method.
 
     Parameters
@@ -110,6 +110,6 @@ def remeasured(
     return tuple(_joined(found) for found in parts)
 
 
-def _joined(parts: list[measure.Measurements]) -> Values:
+def _joined(parts: list[measure.Measurements]) -> MeasuredValues:
     columns = ([getattr(part, name) for part in parts] for name in ("value_image", "value", "status"))
-    return Values(*map(np.concatenate, columns))
+    return MeasuredValues(*map(np.concatenate, columns))

@@ -28,7 +28,7 @@ from measure import Correction, Images
 from measure.correction import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from measure.unevenness import Unevenness
-from render import Quality, Tolerance
+from render import EffectTolerance, Quality
 from render import variant as variants
 from render.build import MANY_WAYS
 from render.large import LARGE_RANDOM, near_required
@@ -57,7 +57,7 @@ class How:
     quality: Quality = Quality()
     variant: str | None = None
     effects: str = "auto"
-    tolerance: Tolerance = Tolerance()
+    tolerance: EffectTolerance = EffectTolerance()
     everywhere: bool = False
 
     def by(self, *methods: Method) -> How:

@@ -185,7 +185,7 @@ def _arrangement(pictures: Pictures) -> Arrangement:
     pieces, sides, owners = [], [], []
     names = straight(scene)
     for edge in solid.edges:
-        pair = _sides(solid, edge, image, place)
+        pair = faces_beside(solid, edge, image, place)
         if pair[0] != pair[1] and np.isfinite(image[list(edge.ends)]).all():
             pieces.append(edge.ends)
             sides.append(pair)
@@ -248,11 +248,16 @@ def _region(pictures: Pictures, solid: Solid, face: int) -> Region | None:
     return Region.shaded(places[good], levels[good])
 
 
-def _sides(solid: Solid, edge: Edge, image: np.ndarray, place: dict[int, int]) -> tuple[int, int]:
-    """Regions on both sides of a convex body's edge, told by the middles of its faces."""
+def faces_beside(
+    solid: Solid, edge: Edge, image: np.ndarray, place: dict[int, int], none: int = BACKGROUND
+) -> tuple[int, int]:
+    """What ``place`` says of the faces on both sides of a convex body's edge in an image, told by their middles.
+
+    First that on the side of the edge's normal (-t_y, t_x); ``none`` where it says nothing.
+    """
     start, stop = image[list(edge.ends)]
     normal = np.array([-(stop - start)[1], (stop - start)[0]])
-    sides = [BACKGROUND, BACKGROUND]
+    sides = [none, none]
     for face in edge.faces:
         if face in place:
             sides[0 if (image[list(solid.faces[face])].mean(0) - start) @ normal > 0 else 1] = place[face]

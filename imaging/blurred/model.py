@@ -17,7 +17,7 @@ from scipy.special import ndtr
 
 from imaging.blurred.arrangement import BACKGROUND, Arrangement
 from imaging.blurred.kernels import Kernels, Scatter
-from imaging.blurred.quadrature import Nodes
+from imaging.blurred.quadrature import PieceNodes
 from imaging.geometry.lens import lens_jacobian
 
 LEAST_BLUR = 0.3  # px; a sharper image is modelled as this sharp
@@ -84,12 +84,12 @@ class BlurredModel:
         return tuple(region.slope(self.points) for region in self.arrangement.regions)
 
     @cached_property
-    def nodes(self) -> Nodes:
+    def nodes(self) -> PieceNodes:
         """Fixed by the expected place, so that the model is a smooth function of its parameters."""
         arrangement = self.arrangement
         ends = arrangement.recorded(arrangement.vertices[arrangement.pieces])
         lengths = np.nan_to_num(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1))
-        return Nodes.on(lengths, max(arrangement.blur_px, LEAST_BLUR))
+        return PieceNodes.on(lengths, max(arrangement.blur_px, LEAST_BLUR))
 
     @cached_property
     def _window(self) -> tuple[int, int, int, int]:

@@ -12,7 +12,7 @@ _MORE = 5  # nodes beside one for each standard deviation of the blur
 _END = 1e-7  # relative error that the map of a rule's nodes makes at its ends
 
 
-class Nodes(NamedTuple):
+class PieceNodes(NamedTuple):
     """Quadrature nodes on all pieces, n of them, piece after piece: piece, fraction of its length, weight."""
 
     piece: np.ndarray
@@ -20,7 +20,7 @@ class Nodes(NamedTuple):
     weight: np.ndarray
 
     @classmethod
-    def on(cls, lengths: np.ndarray, blur: float) -> Nodes:
+    def on(cls, lengths: np.ndarray, blur: float) -> PieceNodes:
         """On pieces so many px long (N,), close enough for a blur of so many px: 3e-7 of a step."""
         parts = [rule(float(length), blur) for length in lengths]
         piece = np.repeat(np.arange(len(parts)), [t.size for t, _ in parts])

@@ -24,12 +24,6 @@ _POLISH = 2
 _NODES, _ROUNDS, _LEAST = np.linspace(0, 1, 257), 4, 0.1  # of the angles seen from the eye; least share of a step
 
 
-def touching_cone(quadric: Quadric, eye: np.ndarray) -> np.ndarray:
-    """M, shape (3, 3): d'Md >= 0 for the directions d of lines through the eye (3,) that meet the quadric."""
-    half = quadric.gradient(eye) / 2
-    return np.outer(half, half) - quadric.function(eye) * quadric.form
-
-
 @dataclass(frozen=True, eq=False)
 class Touched:
     """A conic in the polar plane: l1 x^2 + l2 y^2 = l3 z^2 in homogeneous coordinates ``axes`` (3, 3) of the plane.

@@ -30,7 +30,7 @@ LEAST_SEEN = 0.1  # of a whole turn: what of a rim must have contrast; an arc is
 
 
 @dataclass(frozen=True, eq=False)
-class Rim:
+class RimImage:
     """Points on the image of a circle, for settings of leading shape (...).
 
     Attributes
@@ -83,7 +83,7 @@ class Rim:
         return self.squared > 0
 
 
-def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
+def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> RimImage:
     """Sample a circular edge at equal angles.
 
     One picture is looked at (`imaging.features.rim_look`), as a measurement does; of many the levels at the rim and
@@ -102,11 +102,11 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> Rim:
     off_ends = None if circle.ends is None else within_ends(pictures, circle, angle)
     if seen is not None:
         squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
-        return Rim(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends)
+        return RimImage(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
-    return Rim(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends)
+    return RimImage(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends)
 
 
 def _off(squared: np.ndarray, off_ends: np.ndarray | None) -> np.ndarray:
@@ -114,14 +114,14 @@ def _off(squared: np.ndarray, off_ends: np.ndarray | None) -> np.ndarray:
     return squared if off_ends is None else np.where(off_ends, squared, 0.0)
 
 
-def fisher_circle(circle: Rim, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
+def fisher_circle(circle: RimImage, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
     """Covariance of the three parameters from independent points of the given inverse variances (..., n), unit^2."""
     information = np.einsum("...n,...ni,...nj->...ij", weights, circle.design, circle.design)
     enough = circle.left >= LEAST_SEEN
     return _covariance(information, enough if counted is None else enough & (counted.sum(-1) > 3))
 
 
-def calibrated_circle(circle: Rim, kappa2: float, scale: float, weakest: float) -> np.ndarray:
+def calibrated_circle(circle: RimImage, kappa2: float, scale: float, weakest: float) -> np.ndarray:
     """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
 
     Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the

@@ -9,25 +9,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from imaging.features.circles import Rim
+from imaging.features.circles import RimImage
 from imaging.features.limb_look import LimbLook, clear_of_others, limb_look
 from imaging.features.limb_outline import LIMB_POINTS, LimbOutline, limb_outline
 from imaging.pictures import Pictures
 from scenes import Curved
 
 
-def limb_rim(pictures: Pictures, curved: Curved) -> Rim:
+def limb_rim(pictures: Pictures, curved: Curved) -> RimImage:
     """Sample a limb at equal steps of its parameter; found once for each set of pictures."""
     return pictures.once(("limb", curved.name), lambda: _limb_rim(pictures, curved))
 
 
-def _limb_rim(pictures: Pictures, curved: Curved) -> Rim:
+def _limb_rim(pictures: Pictures, curved: Curved) -> RimImage:
     outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
     seen = limb_look(pictures, curved, outline)
     clear = seen.good & clear_of_others(pictures, curved, outline, seen)
     return rim_of(outline, seen, clear)
 
 
-def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray) -> Rim:
+def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray) -> RimImage:
     """As a circle's rim; places that are not there have no contrast."""
-    return Rim(np.nan_to_num(outline.design), np.nan_to_num(outline.arc), seen.squared, seen.noise_variance, clear)
+    return RimImage(np.nan_to_num(outline.design), np.nan_to_num(outline.arc), seen.squared, seen.noise_variance, clear)

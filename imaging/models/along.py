@@ -21,7 +21,7 @@ NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class EdgeNodes:
     """Gauss-Legendre nodes along the used part of the image of each edge: (first end, nodes, last end).
 
     Attributes
@@ -52,7 +52,7 @@ class Along:
     """Nodes, and the squared contrast and the noise's variance there, (..., E, n) each."""
 
     measurands: Measurands
-    nodes: Nodes
+    nodes: EdgeNodes
     squared: np.ndarray
     noise_variance: np.ndarray | float
 
@@ -63,7 +63,7 @@ class Along:
         return cls(known, nodes, *edge_contrast(pictures, known.view.names, nodes.spatial))
 
 
-def place_nodes(pictures: Pictures, view: ProjectedEdges, trims: np.ndarray) -> Nodes:
+def place_nodes(pictures: Pictures, view: ProjectedEdges, trims: np.ndarray) -> EdgeNodes:
     """Nodes on what is left of each edge after trims (..., E, 2), px."""
     camera = pictures.scene.camera
     whole = np.where(view.lengths > 0, view.lengths, np.nan)[..., None]  # an edge seen end-on has no direction
@@ -78,7 +78,7 @@ def place_nodes(pictures: Pictures, view: ProjectedEdges, trims: np.ndarray) -> 
     across = along = 1.0
     if camera.lens.bends:
         across, along = _magnified(camera, view, fractions)
-    return Nodes(t, middle, length, spatial, blur, across, along)
+    return EdgeNodes(t, middle, length, spatial, blur, across, along)
 
 
 def _magnified(camera, view: ProjectedEdges, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -24,7 +24,7 @@ from imaging.geometry.projection import edge_points
 from imaging.light.appearance import is_plain, side_signals
 from imaging.light.between import is_exchanged
 from imaging.light.sheets import printed
-from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
+from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
 from imaging.models.calibrated import calibrated
 from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
@@ -186,7 +186,7 @@ def _corners(scene: Scene, view, lines: np.ndarray) -> np.ndarray:
     return found
 
 
-def _sampled(pictures: Pictures, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(pictures: Pictures, nodes: EdgeNodes) -> tuple[np.ndarray, np.ndarray]:
     """Mean shift, ideal px, and turn of each line by the sampling, (N, E); a bent edge is taken as its tangent."""
     scene, view = pictures.scene, measurands(pictures).view
     fraction = nodes.middle / view.lengths[..., None]
@@ -201,7 +201,7 @@ def _sampled(pictures: Pictures, nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
     return mean * across, turn * across * size / view.lengths
 
 
-def _crossings(pictures: Pictures, nodes: Nodes, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _crossings(pictures: Pictures, nodes: EdgeNodes, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Place of the zero crossing across the edge, ideal px, and the slope there over the lone step's, (N, E, n)."""
     scene, view = pictures.scene, measurands(pictures).view
     fractions = (nodes.middle + nodes.t[..., 1:-1]) / view.lengths[..., None]

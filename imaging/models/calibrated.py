@@ -7,7 +7,7 @@ import numpy as np
 from imaging.features.circles import calibrated_circle
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kappa2
 from imaging.light.appearance import is_separable
-from imaging.models.along import NODE_WEIGHTS, Along, Nodes
+from imaging.models.along import NODE_WEIGHTS, Along, EdgeNodes
 from imaging.models.errors import Errors, combined
 from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
@@ -60,22 +60,22 @@ def _calibrated(pictures: Pictures) -> Errors:
     return combined(pictures, line_variance, squared.mean(-1), noise.mean(-1), found)
 
 
-def point_variance(nodes: Nodes, scale: float) -> np.ndarray | float:
+def point_variance(nodes: EdgeNodes, scale: float) -> np.ndarray | float:
     """Variance of an edge point's offset in ideal px at unit noise and unit contrast."""
     return kappa2(scale, nodes.blur) * np.square(nodes.across)
 
 
-def line_weight(nodes: Nodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def line_weight(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """f(t): what an error at t adds to A d + B theta of the least-squares line, (..., E, n)."""
     return (a[..., None] + line_slope(nodes, a, b) * nodes.length * nodes.t) / nodes.length
 
 
-def line_slope(nodes: Nodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def line_slope(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Its derivative by t, (..., E, 1)."""
     return 12 * (b[..., None] - a[..., None] * nodes.middle) / nodes.length**3
 
 
-def long_edge(nodes: Nodes, weight: np.ndarray, slope: np.ndarray, scale: float) -> np.ndarray:
+def long_edge(nodes: EdgeNodes, weight: np.ndarray, slope: np.ndarray, scale: float) -> np.ndarray:
     """Coefficients, (..., E, n), with which the points' variances add up to a long edge's line's.
 
     The smoothing scale is that of recorded px: along the edge it spans scale / along ideal px.
@@ -87,11 +87,11 @@ def long_edge(nodes: Nodes, weight: np.ndarray, slope: np.ndarray, scale: float)
     return inside * (2 * np.sqrt(np.pi) * span * weight**2 + tilted) - 2 * span**2 * ends * weight**2
 
 
-def _picked(nodes: Nodes, g: np.ndarray, which: np.ndarray):
+def _picked(nodes: EdgeNodes, g: np.ndarray, which: np.ndarray):
     return (np.broadcast_to(v, (*which.shape, v.shape[-1]))[which] for v in (g, nodes.t, nodes.length))
 
 
-def _first_order(nodes: Nodes, a: np.ndarray, b: np.ndarray, per_point: np.ndarray, kept: np.ndarray) -> np.ndarray:
+def _first_order(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray, per_point: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """Integral of g^2 for the least-squares line through the points of enough contrast only."""
     t, lever = nodes.t[..., 1:-1], b[..., None] - a[..., None] * nodes.middle
     used = np.where(kept[..., 1:-1], NODE_WEIGHTS * nodes.length / 2, 0.0)

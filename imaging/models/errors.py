@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.features.circles import Rim, rim
+from imaging.features.circles import RimImage, rim
 from imaging.features.limbs import limb_rim
 from imaging.features.measurand import Measurands, measurands
 from imaging.pictures import Pictures
@@ -111,7 +111,7 @@ def combined(
     line_variance: LineVariance,
     contrast2: np.ndarray,
     noise_variance: np.ndarray | float,
-    circle_covariance: Callable[[Rim], np.ndarray],
+    circle_covariance: Callable[[RimImage], np.ndarray],
     *,
     fall_off: bool = True,
 ) -> Errors:
@@ -126,7 +126,7 @@ def combined(
     return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded, left)
 
 
-def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> Rim:
+def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> RimImage:
     return limb_rim(pictures, each) if isinstance(each, Curved) else rim(pictures, each, fall_off=fall_off)
 
 

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from measure.boards.adjustment import Adjusted, adjust, begin
 from measure.boards.chessboard import Board
 from measure.boards.parameters import Model, read_model
-from measure.photo.lens import Lens
+from measure.photo.lens import Intrinsics
 from scenes import status
 from scenes.cameras.covariance import Covariance
 from scenes.errors import InvalidInput
@@ -36,7 +36,7 @@ class CameraCalibration:
         Of those, px for fx, fy, cx, cy.
     covariance : ndarray, shape (k, k)
         Of those; enlarged by ``dispersion``.
-    lens : Lens
+    lens : Intrinsics
         All intrinsics, as `measure.measure_quadrilateral` takes them.
     image_shape : (height, width)
     poses : ndarray, shape (boards, 6)
@@ -61,7 +61,7 @@ class CameraCalibration:
     names: tuple[str, ...]
     values: np.ndarray
     covariance: np.ndarray
-    lens: Lens
+    lens: Intrinsics
     image_shape: tuple[int, int]
     poses: np.ndarray
     pose_covariance: np.ndarray
@@ -171,10 +171,12 @@ def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: fl
     )  # fmt: skip
 
 
-def _lens(matrix: np.ndarray, coefficients: np.ndarray) -> Lens:
+def _lens(matrix: np.ndarray, coefficients: np.ndarray) -> Intrinsics:
     """The lens of a camera matrix (3, 3) and five coefficients, which boards alike may leave anywhere."""
     try:
-        return Lens(fx=matrix[0, 0], fy=matrix[1, 1], cx=matrix[0, 2], cy=matrix[1, 2], distortion=tuple(coefficients))
+        return Intrinsics(
+            fx=matrix[0, 0], fy=matrix[1, 1], cx=matrix[0, 2], cy=matrix[1, 2], distortion=tuple(coefficients)
+        )
     except ValidationError:
         said = ", ".join(f"{value:.3g}" for value in coefficients)
         raise InvalidInput(

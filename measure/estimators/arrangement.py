@@ -70,7 +70,7 @@ class Point(NamedTuple):
     cost: float
 
 
-class Fit(NamedTuple):
+class Likeliest(NamedTuple):
     """The likelihood's maximum in one image.
 
     Attributes
@@ -111,7 +111,7 @@ class Centre:
     freedom, scale : tuple of float
         Degrees of freedom of each chi-square, and the factor on it (1, but where the scale cuts noise off).
     settled, rivalled : bool
-        As in `Fit`.
+        As in `Likeliest`.
     """
 
     state: State
@@ -234,7 +234,7 @@ class ArrangementEstimator:
             row[:] = self.parameters(fit.state) - truth
         return linear, full
 
-    def climb(self, used: np.ndarray, state: State, mean: np.ndarray | None = None) -> Fit:
+    def climb(self, used: np.ndarray, state: State, mean: np.ndarray | None = None) -> Likeliest:
         """Fisher scoring from a state to the likelihood's maximum for one image (P,).
 
         ``mean`` (q,) is what is known of the parameters before, that of `before` when not given.
@@ -246,7 +246,7 @@ class ArrangementEstimator:
             point, settled, damping = self._step(used, point, matrix, damping)
             if settled or self._is_lost(point.state):
                 break
-        return Fit(point, _inverse(point.fisher), settled)
+        return Likeliest(point, _inverse(point.fisher), settled)
 
     def _is_lost(self, state: State) -> bool:
         """Whether the steps have gone where no measurement is."""
@@ -302,7 +302,7 @@ class ArrangementEstimator:
         vertices, blur = np.abs(step[: 2 * self.model.free.size]).max(initial=0.0), abs(float(step[-1]))
         return step / max(1.0, vertices / _STRIDE, blur / (0.5 * self.model.start().blur))
 
-    def centre(self, fit: Fit) -> Centre:
+    def centre(self, fit: Likeliest) -> Centre:
         """Prepare a state for a stack of images."""
         precision, point = self.prior, fit.point
         first = 2 * self.model.free.size

@@ -50,7 +50,7 @@ class EllipseFit:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Sought:
     """Where on the outline edge points were sought: its parameters t (m,), and whether they were found, bool (m,)."""
 
     angles: np.ndarray
@@ -69,7 +69,7 @@ class Seen:
 
 
 def likeliest_ellipse(
-    image: np.ndarray, start: np.ndarray, optics: Optics, circle: bool, seen: Seen
+    image: np.ndarray, start: np.ndarray, optics: Optics, circle: bool, seen: Sought
 ) -> EllipseFit | None:
     """Fisher's scoring with shape, both levels and the blur free; None where it runs away or has no maximum.
 
@@ -80,7 +80,7 @@ def likeliest_ellipse(
         Symmetric parameters (`blurred_ellipse`).
     optics : Optics
     circle : bool
-    seen : Seen
+    seen : Sought
         Pixels beside other parts of the outline do not count.
     """
     shape, blur, free = start, max(optics.blur_px, LEAST_BLUR), free_parameters(circle)
@@ -165,7 +165,7 @@ class _Linear:
     residual: np.ndarray
 
     @classmethod
-    def at(cls, image, shape, blur: float, optics: Optics, free, seen: Seen) -> _Linear | None:
+    def at(cls, image, shape, blur: float, optics: Optics, free, seen: Sought) -> _Linear | None:
         """Linear at an ellipse and a blur; None where the pixels do not determine all."""
         columns, rows, near = _near(shape, optics, seen)
         coverage, derivatives = ellipse_image(shape, columns, rows, blur)
@@ -206,7 +206,7 @@ class _Linear:
         return bool((self.residual**2 / variance).sum() / _ALLOWED < chdtri(freedom, _RARE))
 
 
-def _near(shape: np.ndarray, optics: Optics, seen: Seen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _near(shape: np.ndarray, optics: Optics, seen: Sought) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns (W,) and rows (H,) around an ellipse in the image, and which of their pixels are used, (H, W)."""
     band = _BAND * CLEARANCE * edge_blur(optics.blur_px)
     reach = np.array([np.hypot(shape[2], shape[4]), np.hypot(shape[3], shape[4])]) + band

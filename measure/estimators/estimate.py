@@ -46,11 +46,8 @@ class Estimator(Protocol):
     def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
         """Covariance of (level, slope) of all edges found in the images, shape (n, 2 E, 2 E)."""
 
-    def respond(self, clean: np.ndarray) -> np.ndarray:
-        """Derivative of (level, slope) of each edge by the pixels at a noise-free image, (2 E, height * width)."""
-
     def respond_within(self, clean: np.ndarray) -> np.ndarray:
-        """The same by the pixels that it looks at alone, (2 E, P)."""
+        """Derivative of (level, slope) of each edge by `pixels` at a noise-free image, (2 E, P)."""
 
 
 def noisy(rows: np.ndarray, optics: Optics, images: np.ndarray, pixels: np.ndarray) -> np.ndarray:

@@ -212,7 +212,7 @@ def _sum(x: list[np.ndarray], y: list[np.ndarray], terms) -> np.ndarray:
     return sum(y[j][:, :, None] * (x[i] * factor[:, None])[:, None] for i, j, factor in terms)
 
 
-class Seen(NamedTuple):
+class Evidence(NamedTuple):
     """All that n images tell an expansion.
 
     Attributes
@@ -319,7 +319,7 @@ class Expansion:
         gram[: len(gram_far), : len(gram_far)] += gram_far
         return cls(order, pieces, expected, root, linear, rows, near, gram, gram_far, inverse, prior, offset)
 
-    def see(self, used: np.ndarray) -> Seen:
+    def see(self, used: np.ndarray) -> Evidence:
         """What pixels (n, P) of n images, which are used up, tell."""
         away = np.subtract(used, self.expected, out=used)
         away *= self.root
@@ -328,9 +328,9 @@ class Expansion:
         told = [near @ self.linear[: self.near] + far_told]
         told += [away[:, pixels] @ rows for pixels, rows in zip(self.pieces.pixels, self.rows, strict=True)]
         squares = [np.einsum("np,np->n", part, part) for part in (near, far)]
-        return Seen(np.concatenate(told, 1), far_told, np.stack(squares, 1))
+        return Evidence(np.concatenate(told, 1), far_told, np.stack(squares, 1))
 
-    def solve(self, seen: Seen) -> Solved:
+    def solve(self, seen: Evidence) -> Solved:
         """Most likely steps for what n images tell."""
         told, count = seen.told, self.linear.shape[1]
         steps, change = self._climb(told, self.offset)

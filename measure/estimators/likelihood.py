@@ -143,14 +143,8 @@ class LikelihoodEstimator:
         whole = np.einsum(f"neai,{each},nfbj->neafb", to_lines, found, to_lines, optimize=True)
         return whole.reshape(len(to_lines), 2 * edges, 2 * edges)
 
-    def respond(self, clean: np.ndarray) -> np.ndarray:
-        """The rows themselves, divided by the clean image's contrast; the offsets found there are second order."""
-        lines = np.zeros((2 * len(self.calipers), clean.size))
-        lines[:, self.pixels] = self.respond_within(clean)
-        return lines
-
     def respond_within(self, clean: np.ndarray) -> np.ndarray:
-        """The same at `pixels` alone, (2 E, P)."""
+        """The rows themselves, divided by the clean image's contrast; the offsets found there are second order."""
         edges = len(self.calipers)
         to_lines = self._to_lines(self.estimate(clean[None]).contrast)[0]
         return (to_lines @ self.rows[: 2 * edges].reshape(edges, 2, -1)).reshape(2 * edges, -1)

@@ -121,11 +121,8 @@ class PointEstimator:
         shapes = np.linalg.inv(np.vander(self._places, 3)).T @ np.vander(noise.along, 3).T
         return (lines[:, None] * shapes).reshape(6, -1) @ noise.response
 
-    def respond(self, clean: np.ndarray) -> np.ndarray:
-        return self._response(clean).toarray()
-
     def respond_within(self, clean: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-        """The same at some pixels, flat indices in order that hold all of `pixels`, (2, P)."""
+        """Derivative of (level, slope) by some pixels, flat indices in order that hold all of `pixels`, (2, P)."""
         told = self._response(clean).tocoo()
         found = np.zeros((2, pixels.size))
         row, column = told.coords
@@ -184,11 +181,7 @@ class SeparateEstimator:
                 whole[:, here, here] = part.covariance(own, images)
         return whole
 
-    def respond(self, clean: np.ndarray) -> np.ndarray:
-        return np.concatenate([part.respond(clean) if part else np.zeros((2, clean.size)) for part in self.parts])
-
     def respond_within(self, clean: np.ndarray) -> np.ndarray:
-        """The same at `pixels` alone, (2 E, P)."""
         pixels = self.pixels
         return np.concatenate([part.respond_within(clean, pixels) if part else np.zeros((2, pixels.size))
                                for part in self.parts])  # fmt: skip

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from measure.estimators.arrangement import ArrangementEstimator, Centre
-from measure.estimators.expansion import Seen, Solved
+from measure.estimators.expansion import Evidence, Solved
 
 _VALID = 0.003  # of a standard deviation: how large the effect of an expansion's highest order may be
 _AROUND = 0.45  # of the blur: how far an end of a required edge may be from an expansion's centre
@@ -72,7 +72,7 @@ def _around(tool, images, part, centre, collected, number, first) -> np.ndarray:
     """Solve some images around a centre and collect those for which it holds: which they are."""
     expansion, batches = centre.expansion, np.split(part, range(_BATCH, part.size, _BATCH))
     seen = [expansion.see(tool.taken([images[i] for i in batch], expansion.order)) for batch in batches]
-    solved = expansion.solve(Seen(*map(np.concatenate, zip(*seen, strict=True))))
+    solved = expansion.solve(Evidence(*map(np.concatenate, zip(*seen, strict=True))))
     good, settled = _good(tool, solved, centre), np.ones(part.size, bool)
     if first:  # the centre is its own, but for what is left of the last step
         solved.steps[0] *= good[0] and centre.settled

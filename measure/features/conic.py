@@ -156,7 +156,31 @@ def _distances(points: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, 
 def _local(points, x, y, c, s):
     """Coordinates of points along the ellipse's axes."""
     dx, dy = points[:, 0] - x, points[:, 1] - y
-    return c * dx + s * dy, -s * dx + c * dy
+    return c * dx + s * dy, c * dy - s * dx
+
+
+def along_axes(points: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates (m,) of points (m, 2) along the axes of an ellipse x, y, a, b, angle (degrees)."""
+    x, y, _, _, angle = parameters
+    return _local(points, x, y, np.cos(np.radians(angle)), np.sin(np.radians(angle)))
+
+
+def nearly_away(points: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Signed distances (m,) of points (m, 2) from an ellipse x, y, a, b, angle (degrees), px, to first order."""
+    (u, v), (a, b) = along_axes(points, parameters), parameters[2:4]
+    size = np.hypot(u / a, v / b)
+    return (size - 1) * size / np.maximum(np.hypot(u / a**2, v / b**2), 1e-12)
+
+
+def around(parameters: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places (count, 2) on an ellipse x, y, a, b, angle (degrees), and outward unit normals there."""
+    x, y, a, b, angle = parameters
+    t = 2 * np.pi * np.arange(count) / count
+    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    turn = np.array([[cosine, sine], [-sine, cosine]])
+    places = np.stack([a * np.cos(t), b * np.sin(t)], 1) @ turn + [x, y]
+    normals = np.stack([b * np.cos(t), a * np.sin(t)], 1) @ turn
+    return places, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def _free(jacobian: np.ndarray, circle: bool) -> np.ndarray:

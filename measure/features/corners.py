@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import cv2
 import numpy as np
 
 from measure.features.calipers import Caliper
@@ -39,6 +42,18 @@ def intersect(normals: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.n
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(sine == 0, np.nan, reach / sine)
     return points[:, 0] + step[:, None] * np.stack([-b1, a1], -1), np.abs(sine)
+
+
+def corners_through(sides: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (k, 2) of a polygon of lines through points (m, 2) of each side, by Huber's weights, and their sines.
+
+    Corner i is where the sides i - 1 and i meet; as of `intersect`.
+    """
+    lines = [cv2.fitLine(points.astype(np.float32), cv2.DIST_HUBER, 0, 0.01, 0.01).ravel() for points in sides]
+    along, through = np.split(np.array(lines, float), 2, axis=1)
+    across = np.stack([-along[:, 1], along[:, 0]], 1)
+    pairs = (np.stack([np.roll(each, 1, 0), each], 1) for each in (across, through))
+    return intersect(*pairs)
 
 
 def corner_response(calipers: tuple[Caliper, ...], pair: tuple[int, int]) -> np.ndarray:

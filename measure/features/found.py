@@ -55,11 +55,6 @@ class Shape:
     rejected: np.ndarray
     p_value: np.ndarray
 
-    @property
-    def tilt_covariance(self) -> np.ndarray:
-        """Covariance of the lines' angles, rad^2, shape (n, E, E)."""
-        return self.lines[:, 1::2, 1::2]
-
 
 def gather(parts: list[Shape], source: np.ndarray, rows: np.ndarray) -> Shape:
     """One Shape of which image i is row ``rows[i]`` of part ``source[i]``."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from skimage.measure import points_in_poly
 
-from imaging.blurred.arrangement import Arrangement, arrangement_of, polygon_arrangement
+from imaging.blurred.arrangement import Arrangement, arrangement_of, faces_beside, polygon_arrangement
 from imaging.features.projected_edges import corner_features, projected_edges, straight
 from imaging.geometry.lens import signed_confusion
 from imaging.geometry.projection import depth, facing, project_ideal
@@ -178,15 +177,17 @@ class Layout:
         return found
 
 
-@lru_cache(maxsize=64)
 def layout_of(picture: Picture) -> Layout:
     """The straight edges of a scene's quantities as a sensor pose projects them, in ideal image coordinates.
 
     With the lights known, the shading of each face is known too, and a face that is not lit is background.
-
     """
-    scene = picture.scene
-    pictures, solid, pose = Pictures.of(picture), scene.bodies, np.array(list(picture.sensor))
+    pictures = Pictures.of(picture)
+    return pictures.once("layout", lambda: _layout(picture, pictures))
+
+
+def _layout(picture: Picture, pictures: Pictures) -> Layout:
+    scene, solid, pose = picture.scene, picture.scene.bodies, np.array(list(picture.sensor))
     names = straight(scene)
     view = projected_edges(pictures, names)
     points = project_ideal(solid.vertices, pose, scene.camera)
@@ -215,7 +216,7 @@ def layout_of(picture: Picture) -> Layout:
         apart=tuple(_segments(points, [e for e in shown if not set(e.ends) & set(edge.ends)]) for edge in required),
         others=_segments(points, [e for e in shown if e not in required]),
         faces=faces,
-        sides=np.array([_sides(points, edge, solid.faces, place) for edge in required], int).reshape(-1, 2),
+        sides=np.array([faces_beside(solid, edge, points, place, BACKGROUND) for edge in required], int).reshape(-1, 2),
         shadings=tuple(shadings[f] for f in order),
         optics=Optics.of(scene),
         defocus=_defocus(scene, pose, required),
@@ -280,14 +281,3 @@ def _away(points: np.ndarray, edge, end: int, shown) -> np.ndarray:
 
 def _segments(points: np.ndarray, edges) -> np.ndarray:
     return np.array([points[list(edge.ends)] for edge in edges]).reshape(-1, 2, 2)
-
-
-def _sides(points: np.ndarray, edge, faces, place: dict[int, int]) -> list[int]:
-    """Seen faces on the normal's side and on the other, told by the face's middle."""
-    start, stop = points[list(edge.ends)]
-    normal = np.array([-(stop - start)[1], (stop - start)[0]])
-    sides = [BACKGROUND, BACKGROUND]
-    for face in edge.faces:
-        if face in place:
-            sides[0 if (points[list(faces[face])].mean(0) - start) @ normal > 0 else 1] = place[face]
-    return sides

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from measure.estimators.arrangement import ArrangementEstimator, Centre, Fit
+from measure.estimators.arrangement import ArrangementEstimator, Centre, Likeliest
 from measure.features.alignment import align
 from measure.features.layout import Layout
 from measure.goodness import WORST, p_value
@@ -41,14 +41,14 @@ def locate(tool: ArrangementEstimator, layout: Layout, used: np.ndarray, image: 
     return replace(centre, rivalled=_rivals(tool, fit, other))
 
 
-def _rivals(tool: ArrangementEstimator, best: Fit, rest: Fit) -> bool:
+def _rivals(tool: ArrangementEstimator, best: Likeliest, rest: Likeliest) -> bool:
     """Whether two maxima lie apart and the noise does not tell which is the right one."""
     away = tool.parameters(rest.state) - tool.parameters(best.state)
     apart = np.abs(away[: 2 * tool.model.free.size]).max(initial=0.0) > _APART
     return bool(apart and rest.settled and rest.cost - best.cost < _TELLING)
 
 
-def _near(tool: ArrangementEstimator, fit: Fit) -> bool:
+def _near(tool: ArrangementEstimator, fit: Likeliest) -> bool:
     return bool(moved(tool, fit.state.vertices[None])[0] < FURTHEST)
 
 

@@ -76,6 +76,11 @@ class Optics:
             return None
         return expected(self.noise, levels).noise_variance
 
+    def has_room(self, places: np.ndarray) -> np.ndarray:
+        """Whether a locator that stands at places (m, 2) looks at the image alone, bool (m,)."""
+        margin = self.window_px + 4 * self.scale_px + 1
+        return ((places >= margin) & (places <= np.array(self.shape[::-1]) - 1 - margin)).all(1)
+
     def recorded(self, ideal: np.ndarray) -> np.ndarray:
         """Where ideal image points (..., 2) are recorded, px."""
         return ideal if self.camera is None else recorded(ideal, self.camera)

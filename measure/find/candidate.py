@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from measure.features.conic import around
+
 QUADRILATERAL, CIRCLE, ELLIPSE, TAG, CHESSBOARD = KINDS = ("quadrilateral", "circle", "ellipse", "tag", "chessboard")
 
 
@@ -85,8 +87,4 @@ class Candidate:
 
 def ellipse_outline(parameters: np.ndarray, count: int = 64) -> np.ndarray:
     """Points (count, 2) of an ellipse x, y, a, b, angle (degrees)."""
-    x, y, a, b, angle = parameters
-    t = 2 * np.pi * np.arange(count) / count
-    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    u, v = a * np.cos(t), b * np.sin(t)
-    return np.stack([x + cosine * u - sine * v, y + sine * u + cosine * v], 1)
+    return around(parameters, count)[0]

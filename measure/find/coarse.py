@@ -61,10 +61,14 @@ class Coarse:
         """Places (..., 2) in px of the photograph."""
         return np.asarray(points, float) * self.factor + (self.factor - 1) / 2
 
-    def across(self, places: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-        """Derivative along unit normals (m, 2) at places (m, 2) and offsets (t,) from them, shape (m, t)."""
+    def slopes(self, places: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Derivatives by x and y at offsets (t,) along unit normals (m, 2) from places (m, 2), each of shape (m, t)."""
         where = (places[:, None] + offsets[:, None] * normals[:, None]).astype(np.float32)
-        gx, gy = (cv2.remap(each, where, None, cv2.INTER_LINEAR) for each in (self.gx, self.gy))
+        return tuple(cv2.remap(each, where, None, cv2.INTER_LINEAR) for each in (self.gx, self.gy))
+
+    def across(self, places: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+        """Derivative along the normals there, shape (m, t)."""
+        gx, gy = self.slopes(places, normals, offsets)
         return gx * normals[:, :1] + gy * normals[:, 1:]
 
     def levels(self, places: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.features.locator import MIN_CONTRAST, edge_blur
-from measure.estimators.ellipse import EllipseFit, Seen, free_parameters, is_ellipse, likeliest_ellipse
+from measure.estimators.ellipse import EllipseFit, Sought, free_parameters, is_ellipse, likeliest_ellipse
 from measure.estimators.gradient import gradient_along
 from measure.features.blurred_ellipse import curvature, outline, relative, to_symmetric
 from measure.features.calipers import MIN_POSITIONS
@@ -106,7 +106,7 @@ def _found(
     fits: list[EllipseFit | None] = [None] * len(stack)
     clean, noise = np.ones(len(stack), bool), np.sqrt(optics.noise_variance)
     for k in np.flatnonzero(seen & good):
-        fit = likeliest_ellipse(stack[k], starts[k], optics, circle, Seen(angles, found.valid[k]))
+        fit = likeliest_ellipse(stack[k], starts[k], optics, circle, Sought(angles, found.valid[k]))
         good[k] = fit is not None
         seen[k] = found.contrast[k] > MIN_CONTRAST * noise if fit is None else fit.contrast > _LEAST_CONTRAST * noise
         if good[k] and seen[k]:
@@ -122,8 +122,7 @@ def _positions(shape: np.ndarray, optics: Optics, spacing: float) -> tuple[np.nd
     count = max(8, int(length[-1] / (spacing * optics.scale_px)))
     t = np.interp(length[-1] * np.arange(count) / count, length, fine)
     places, normals = outline(shape, t)
-    margin = optics.window_px + 4 * optics.scale_px + 1
-    inside = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(1)
+    inside = optics.has_room(places)
     return t[inside], places[inside], normals[inside]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from measure.features.corners import intersect
+from measure.features.corners import corners_through
 from measure.find.candidate import QUADRILATERAL, Candidate
 from measure.find.coarse import Coarse
 from measure.find.support import contrast, sign_of, steepest, texture
@@ -114,17 +114,10 @@ def _moved(coarse: Coarse, corners: np.ndarray, reach: float) -> np.ndarray | No
     places, normals, piece, _ = _sides(corners, 0.1)
     seen = steepest(coarse, places, normals, _signs(coarse, places, normals, piece)[piece], reach, piece)
     points = places + seen.offsets[:, None] * normals
-    lines = []
-    for side in range(4):
-        used = points[(piece == side) & seen.counts].astype(np.float32)
-        if len(used) < 4:
-            return None
-        lines.append(cv2.fitLine(used, cv2.DIST_HUBER, 0, 0.01, 0.01).ravel().astype(float))
-    along, through = np.split(np.array(lines), 2, axis=1)
-    across = np.stack([-along[:, 1], along[:, 0]], 1)
-    found, sines = intersect(
-        np.stack([np.roll(across, 1, 0), across], 1), np.stack([np.roll(through, 1, 0), through], 1)
-    )
+    used = [points[(piece == side) & seen.counts] for side in range(4)]
+    if min(map(len, used)) < 4:
+        return None
+    found, sines = corners_through(used)
     near_enough = sines.min() > 0.1 and np.abs(found - corners).max() < 4 * reach + 4
     inside = near_enough and (found > 1).all() and (found < coarse.size - 2).all()
     return found if inside and shaped(found) else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from measure.features.conic import along_axes, nearly_away
 from measure.find.candidate import CIRCLE, ELLIPSE, Candidate, ellipse_outline
 from measure.find.coarse import Coarse
 from measure.find.support import contrast, sign_of, steepest, texture
@@ -28,17 +29,8 @@ def ellipse(outline: np.ndarray) -> np.ndarray | None:
 def deviation(outline: np.ndarray, parameters: np.ndarray) -> tuple[float, float]:
     """Root mean square and 95 % quantile of an outline's distances from an ellipse, to first order, px."""
     some = outline[:: max(len(outline) // 200, 1)].astype(float)
-    (u, v), (a, b) = _turned(some, parameters), parameters[2:4]
-    size = np.hypot(u / a, v / b)
-    away = np.abs(size - 1) * size / np.maximum(np.hypot(u / a**2, v / b**2), 1e-12)
+    away = np.abs(nearly_away(some, parameters))
     return float(np.sqrt(np.mean(away**2))), float(np.sort(away)[int(0.95 * (len(away) - 1))])
-
-
-def _turned(points: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    x, y, _, _, angle = parameters
-    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    dx, dy = points[:, 0] - x, points[:, 1] - y
-    return cosine * dx + sine * dy, cosine * dy - sine * dx
 
 
 def near(parameters: np.ndarray, away: float) -> bool:
@@ -80,7 +72,7 @@ def _outline(parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = int(np.clip(length[-1] / 1.5, 24, 240))
     closed = np.concatenate([fine, fine[:1]])
     places = np.stack([np.interp(length[-1] * np.arange(count) / count, length, closed[:, i]) for i in (0, 1)], 1)
-    u, v = _turned(places, parameters)
+    u, v = along_axes(places, parameters)
     angle, (a, b) = np.radians(parameters[4]), parameters[2:4]
     nu, nv = u / a**2, v / b**2
     normals = np.stack([np.cos(angle) * nu - np.sin(angle) * nv, np.sin(angle) * nu + np.cos(angle) * nv], 1)

@@ -81,6 +81,4 @@ def texture(coarse: Coarse, places: np.ndarray, normals: np.ndarray, area: float
     if area > _SMALL**2:
         return False
     usual = np.median(np.abs(coarse.across(places, normals, np.zeros(1))))
-    around = (places[:, None] + _AROUND[:, None] * normals[:, None]).astype(np.float32)
-    gx, gy = (cv2.remap(each, around, None, cv2.INTER_LINEAR) for each in (coarse.gx, coarse.gy))
-    return bool((np.hypot(gx, gy) > _OTHERS * usual).mean() > _MOST_AROUND)
+    return bool((np.hypot(*coarse.slopes(places, normals, _AROUND)) > _OTHERS * usual).mean() > _MOST_AROUND)

@@ -9,10 +9,9 @@ from scipy.special import chdtri
 from imaging.features.locator import MIN_CONTRAST, edge_blur
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.gradient import gradient_along
-from measure.features.conic import Ellipse, fit_ellipse, no_ellipse
+from measure.features.conic import Ellipse, around, fit_ellipse, nearly_away, no_ellipse
 from measure.features.optics import Optics
 from measure.photo.recording import Recording
-from measure.photo.residuals import around
 from scenes import status
 
 _SPACING = 2.0  # smoothing scales between points: between them errors are smooth
@@ -49,8 +48,7 @@ def ellipse_by_points(
     """
     length = np.pi * (near[2] + near[3])
     places, normals = around(near, int(np.clip(length / (_SPACING * optics.scale_px), 16, _MOST)))
-    margin = optics.window_px + 4 * optics.scale_px + 1
-    room = ((places >= margin) & (places <= np.array(optics.shape[::-1]) - 1 - margin)).all(1)
+    room = optics.has_room(places)
     places, normals = places[room], normals[room]
     if len(places) < _LEAST:
         return no_ellipse((), status.NOT_VISIBLE)
@@ -81,28 +79,18 @@ def _fitted(points: np.ndarray, covariance: np.ndarray, circle: bool) -> Ellipse
     fitted = fit_ellipse(points, covariance, circle=circle)
     if fitted.status not in status.MEASURED:
         return fitted
-    away = _distances(points, fitted.parameters)
+    away = nearly_away(points, fitted.parameters)
     kept = np.abs(away) <= _OUTLYING * np.median(np.abs(away)) + 1e-9
     if kept.sum() < _LEAST:
         return no_ellipse((), status.ILL_CONDITIONED)
     fitted = fit_ellipse(points[kept], covariance[np.ix_(kept, kept)], circle=circle)
     if fitted.status not in status.MEASURED:
         return fitted
-    squares = float((_distances(points[kept], fitted.parameters) ** 2 / np.diag(covariance)[kept]).sum())
+    squares = float((nearly_away(points[kept], fitted.parameters) ** 2 / np.diag(covariance)[kept]).sum())
     freedom = int(kept.sum()) - 5
     if kept.mean() > 0.9 and squares / _ALLOWED < chdtri(freedom, _RARE):
         return fitted
     return Ellipse(fitted.parameters, fitted.covariance * max(squares / freedom, 1.0), np.array(status.CLUTTER))
-
-
-def _distances(points: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Distances of points (m, 2) from an ellipse, px, to first order."""
-    x, y, a, b, angle = parameters
-    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    dx, dy = points[:, 0] - x, points[:, 1] - y
-    u, v = cosine * dx + sine * dy, cosine * dy - sine * dx
-    size = np.hypot(u / a, v / b)
-    return (size - 1) * size / np.maximum(np.hypot(u / a**2, v / b**2), 1e-12)
 
 
 def _curvature(parameters: np.ndarray, normals: np.ndarray) -> np.ndarray:

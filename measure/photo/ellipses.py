@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from measure.estimators.ellipse import EllipseFit
-from measure.features.conic import UNITS
+from measure.features.conic import UNITS, around
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 from measure.find.candidate import CIRCLE, ELLIPSE
@@ -15,7 +15,7 @@ from measure.find.ellipse import fitted_ellipse
 from measure.photo.blur import side_blur
 from measure.photo.edge_points import ellipse_by_points
 from measure.photo.recording import Recording, recording
-from measure.photo.residuals import around, ellipse_blur
+from measure.photo.residuals import ellipse_blur
 from measure.photo.tone_curve import UNTOLD, ToneCurve, tone_curve
 from scenes import status
 from scenes.photograph import Photograph

@@ -32,7 +32,7 @@ def _not_tiny(value: float) -> float:
 _Focal = Annotated[float, Field(gt=0, le=1e12), AfterValidator(_not_tiny)]
 
 
-class Lens(Model):
+class Intrinsics(Model):
     """Intrinsics in px and distortion coefficients k1, k2, p1, p2, k3 (OpenCV's order, the rest 0)."""
 
     fx: _Focal
@@ -73,7 +73,7 @@ class Lens(Model):
         return bent.reshape(points.shape)
 
 
-def load_lens(path: Path) -> Lens:
+def load_lens(path: Path) -> Intrinsics:
     """Read a lens from TOML.
 
     Raises
@@ -82,7 +82,7 @@ def load_lens(path: Path) -> Lens:
         If the file cannot be read, is no TOML, or a value in it is bad.
     """
     try:
-        return Lens.model_validate(read_toml(path))
+        return Intrinsics.model_validate(read_toml(path))
     except ValidationError as error:
         raise InvalidInput(f"{path}: {describe(error)}") from None
 
@@ -96,7 +96,7 @@ class Straightened:
     used: np.ndarray
 
 
-def straight_corners(image: np.ndarray, layout: Layout, lens: Lens) -> Straightened:
+def straight_corners(image: np.ndarray, layout: Layout, lens: Intrinsics) -> Straightened:
     """Corners of a layout given in straightened coordinates, from edge points found in the distorted image.
 
     Edge points are sought along the bent image of each side, straightened one by one, and fitted by straight lines.
@@ -131,7 +131,7 @@ def straight_corners(image: np.ndarray, layout: Layout, lens: Lens) -> Straighte
     return _corners(layout, calipers, np.array(lines), blocks, np.array(used))
 
 
-def _bent(caliper, lens: Lens) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bent(caliper, lens: Intrinsics) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stations of a side, their places in the distorted image, and the unit normals there."""
     t = caliper.positions
     straight = caliper.at(t, np.zeros(1))

@@ -16,7 +16,7 @@ from measure.find.choose import find_in, nearest
 from measure.find.search import check_kinds, find
 from measure.photo.board_noise import board_covariance
 from measure.photo.ellipses import measure_ellipse
-from measure.photo.lens import Lens
+from measure.photo.lens import Intrinsics
 from measure.photo.noise import noise_sigma
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.photo.recording import recording
@@ -98,7 +98,7 @@ def photograph(
     kinds: tuple[str, ...] | None = None,
     most: int = 5,
     estimator: str = "arrangement",
-    lens: Lens | None = None,
+    lens: Intrinsics | None = None,
 ) -> Shapes:
     """Find shapes in a photograph and measure them, some at a time where there are several processors.
 
@@ -118,7 +118,7 @@ def photograph(
         How many are measured, the most prominent first.
     estimator : str
         Of the quadrilaterals and tags.
-    lens : Lens, optional
+    lens : Intrinsics, optional
         With it only quadrilaterals and tags are measured, for ellipses are not freed from distortion.
 
     Raises
@@ -146,7 +146,7 @@ def photograph(
     return Shapes(found, candidates)
 
 
-def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Lens | None) -> MeasuredShape:
+def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Intrinsics | None) -> MeasuredShape:
     if one.kind in (CIRCLE, ELLIPSE):
         return _round(photo, one)
     if one.kind == CHESSBOARD:
@@ -154,7 +154,9 @@ def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Lens | No
     return _straight(photo, one.outline, one, estimator, lens)
 
 
-def _straight(photo: Photograph, near: Any, one: Candidate | None, estimator: str, lens: Lens | None) -> MeasuredShape:
+def _straight(
+    photo: Photograph, near: Any, one: Candidate | None, estimator: str, lens: Intrinsics | None
+) -> MeasuredShape:
     seen = photo
     if one is not None and one.kind == TAG:
         noise = noise_sigma(photo.levels)
@@ -168,7 +170,7 @@ def _straight(photo: Photograph, near: Any, one: Candidate | None, estimator: st
     )  # fmt: skip
 
 
-def _residuals(photo: Photograph, told: Quadrilateral, lens: Lens | None) -> tuple[Residuals, ...]:
+def _residuals(photo: Photograph, told: Quadrilateral, lens: Intrinsics | None) -> tuple[Residuals, ...]:
     return of_sides(photo.levels, told.corners) if lens is None else ()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from measure.features.corners import intersect
+from measure.features.corners import corners_through
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
 
@@ -18,16 +18,13 @@ def refined(image: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
     As they were where a line is not found within 6 px.
     """
-    lines = []
+    sides = []
     for places, normal, offsets, profiles in _across(image, corners):
         rise = np.diff(profiles, axis=1)
         steep = np.clip(rise * np.sign(rise.sum()), 0, None) ** 2
         middle = (steep @ (offsets[1:] + offsets[:-1]) / 2) / np.maximum(steep.sum(1), 1e-12)
-        points = (places + middle[:, None] * normal).astype(np.float32)
-        lines.append(cv2.fitLine(points, cv2.DIST_HUBER, 0, 0.01, 0.01).ravel().astype(float))
-    along, points = np.split(np.array(lines), 2, axis=1)
-    normals = np.stack([-along[:, 1], along[:, 0]], 1)
-    found, _ = intersect(np.stack([np.roll(normals, 1, 0), normals], 1), np.stack([np.roll(points, 1, 0), points], 1))
+        sides.append(places + middle[:, None] * normal)
+    found, _ = corners_through(sides)
     return found if np.abs(found - corners).max() < 2 * _REACH else corners
 
 

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from measure.features.conic import around
+
 _REACH, _STEP = 4.0, 0.5  # px across an outline
 _NEAR = 1.5  # px: where the edge's sign is told
 _MOST = 60  # places along a side
@@ -56,17 +58,6 @@ def of_ellipse(image: np.ndarray, parameters: np.ndarray) -> Residuals:
     """Of an ellipse x, y, a, b, angle (degrees)."""
     places, normals = around(parameters, 2 * _MOST)
     return _residuals(image, places, normals)
-
-
-def around(parameters: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places (count, 2) on an ellipse and outward unit normals there."""
-    x, y, a, b, angle = parameters
-    t = 2 * np.pi * np.arange(count) / count
-    cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    turn = np.array([[cosine, sine], [-sine, cosine]])
-    places = np.stack([a * np.cos(t), b * np.sin(t)], 1) @ turn + [x, y]
-    normals = np.stack([b * np.cos(t), a * np.sin(t)], 1) @ turn
-    return places, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def ellipse_blur(image: np.ndarray, parameters: np.ndarray) -> float:

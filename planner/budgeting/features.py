@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.features.circles import Rim, rim
+from imaging.features.circles import RimImage, rim
 from imaging.features.limb_outline import limb_outline
 from imaging.features.limbs import limb_rim
 from imaging.features.locator import MIN_CONTRAST
@@ -20,7 +20,7 @@ from imaging.features.measurand import Measurands, measurands, normals
 from imaging.features.rim_sides import outward_normals
 from imaging.geometry.lens import undistorted
 from imaging.geometry.projection import edge_points, project_ideal
-from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes, used_trims
+from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
 from imaging.pictures import Pictures
 from planner.budgeting.station import Station
 from scenes import Curved
@@ -54,7 +54,7 @@ class Features:
         return np.concatenate(parts)
 
     @cached_property
-    def _nodes(self) -> tuple[Nodes, np.ndarray]:
+    def _nodes(self) -> tuple[EdgeNodes, np.ndarray]:
         """Along the edges, and their points in space (E, n, 3)."""
         view = self.known.view
         nodes = place_nodes(self.pictures, view, used_trims(self.pictures, view, trimmed=True))
@@ -110,7 +110,7 @@ class Features:
         return found.reshape(*points.shape[:-1], 2)
 
 
-def _fit(seen: Rim) -> np.ndarray:
+def _fit(seen: RimImage) -> np.ndarray:
     """Weighted least squares from offsets around a rim to its circle, (p, n); NaN where it is not found."""
     ratio = seen.squared / seen.noise_variance
     used = (seen.clear | seen.crowded[..., None]) & (ratio >= MIN_CONTRAST**2)

@@ -14,7 +14,7 @@ from planner.budgeting.budgets import SceneBudget, budget
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
-from planner.search.constraints import Constraints
+from planner.constraints import Constraints
 from planner.search.grid import Grid, as_poses
 from planner.search.local import refine
 from planner.search.objective import Report, SearchProblem

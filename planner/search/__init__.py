@@ -1,1 +1,1 @@
-"""Where to put sensor and light: viewing space, searches, constraints."""
+"""Where to put sensor and light: viewing space, what is minimised, searches."""

@@ -1,4 +1,11 @@
-"""The best of all sensor x light pairs, by branch and bound where there is a bound."""
+"""The best of all sensor x light pairs, by branch and bound where there is a bound.
+
+On a convex diffuse solid a lower bound of the variances of all pairs is one matrix product a quantity: an edge's
+contrast is K / r (or K / r^3 with fall-off), where K depends on the light and on which faces the sensor sees, r on the
+light and the place along the edge. For the paper's model the line's variance is a convex function of the weights
+K^2 / r^2, so it lies above its tangent at equal weights, which is linear in 1 / r^2. The calibrated model is linear in
+r^6 itself, and with shot noise in r^3, too. All are then, edge by edge, a sum of products (sensor) x (light).
+"""
 
 from __future__ import annotations
 
@@ -7,15 +14,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imaging.features.projected_edges import circles
-from imaging.light.appearance import is_separable
-from planner.search.bound import Separable, separable
-from planner.search.constraints import Constraints
+from imaging.features.locator import MIN_USABLE, correlation
+from imaging.features.measurand import Measurands, measurands
+from imaging.features.projected_edges import circles, image_fractions
+from imaging.geometry.projection import facing
+from imaging.light.appearance import edge_distance2, is_separable, of_sides, paper_step, side_strengths
+from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
+from imaging.models.calibrated import SHORT, line_slope, line_weight, long_edge, point_variance
+from imaging.models.paper import PAPER_KAPPA2, PAPER_POINTS
+from imaging.pictures import Pictures
+from imaging.sensor import headroom, shot_noise
+from planner.constraints import Constraints
 from planner.search.objective import Aim, Report, SearchProblem, cut_off, minimised
 from scenes import Scene
 
 _ROWS = 256  # sensors at a time
 _PAIRS = 1 << 16  # pairs evaluated exactly at a time
+_DEGREE = 7  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the smooth functions here
+_MARGIN = 3e-6  # relative; single precision in sums of about 30 terms of like size
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,3 +164,201 @@ def _better(best: tuple[float, int, int], sensors: np.ndarray, lights: np.ndarra
         return best
     k = int(values.argmin())
     return float(values[k]), int(sensors[k]), int(lights[k])
+
+
+@dataclass(frozen=True, eq=False)
+class Separable:
+    """Lower bound of what is minimised: the most, or the sum, over the quantities m of the sums over k of
+    sensor_part[s, m, k] light_part[l, k] strength[class of s, l, kind of k].
+
+    Attributes
+    ----------
+    sensors : ndarray of int, shape (S,)
+        Indices of the sensors that can measure at all.
+    classes : ndarray of int, shape (S,)
+        Which set of faces each of them sees.
+    sensor_part : ndarray, shape (S, M, E, k)
+        Weighted with the share of each quantity in what is minimised.
+    light_part : ndarray, shape (L, E, k)
+        The k are in equal parts of the kinds of strength.
+    strength : ndarray, shape (classes, L, E, kinds)
+        What an edge's contrast makes of them; 0 where there is none.
+    aim : Aim
+        What is minimised.
+    """
+
+    sensors: np.ndarray
+    classes: np.ndarray
+    sensor_part: np.ndarray
+    light_part: np.ndarray
+    strength: np.ndarray
+    aim: Aim
+
+    def of_class(self, which: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Indices of sensors (into `sensors`) and lights that see contrast on all edges, and the lights' matrix."""
+        strength = self.strength[which]
+        lights = np.flatnonzero((strength[..., 0] > 0).all(-1))
+        part = self.light_part[lights].reshape(*strength[lights].shape, -1) * strength[lights][..., None]
+        part = part.reshape(len(lights), -1)
+        return np.flatnonzero(self.classes == which), lights, np.ascontiguousarray(part.T, np.float32)
+
+    def rows(self, which: np.ndarray, lights: np.ndarray) -> np.ndarray:
+        """Bound for some sensors (indices into `sensors`) and the matrix of `of_class`, single precision."""
+        part = self.sensor_part[which].astype(np.float32)
+        bounds = (part[:, m].reshape(len(part), -1) @ lights for m in range(part.shape[1]))
+        return self.aim.joined(bounds)
+
+
+def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, aim: Aim | str) -> Separable:
+    """Set up the bound for a separable scene and quantities of straight edges.
+
+    Parameters
+    ----------
+    sensors, lights : ndarray, shape (n, 2), (m, 2)
+        Poses, degrees.
+    model : {"paper", "calibrated"}
+    aim : Aim, or objective of one quantity
+    """
+    pictures, aim = Pictures.of(scene, sensors), Aim.of(scene.quantities, aim)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        known = measurands(pictures)
+        make = _paper if model == "paper" else _calibrated
+        gradient = known.gradient if aim.unit == "image" else known.gradient_object
+        sensor_part, good = make(pictures, known, *known.of_lines(gradient))
+        sensor_part = sensor_part * aim.shares[:, None, None]
+    good &= known.view.visible.all(-1) & np.isfinite(sensor_part).all((-1, -2, -3))
+    light_part = _light_part(scene, known.view.names, lights, model)
+    slack = 1 - _MARGIN * np.sign(sensor_part * light_part.mean(0))  # less where it adds, more where it takes away
+    seen = facing(scene.solid, pictures.sensor_at[good])
+    kinds, classes = np.unique(seen, axis=0, return_inverse=True)
+    first = [int(np.flatnonzero(good)[np.argmax(classes == k)]) for k in range(len(kinds))]
+    strength = [_strengths(scene, known.view.names, sensors[k], lights, model) for k in first]
+    return Separable(
+        np.flatnonzero(good), classes.ravel(), (sensor_part * slack)[good], light_part, np.array(strength), aim
+    )  # fmt: skip
+
+
+def _strengths(scene: Scene, names: tuple[str, ...], sensor: np.ndarray, lights: np.ndarray, model: str) -> np.ndarray:
+    """1 / K^2 of each edge and, for the calibrated model, (K_1 + K_2) / K^2 / 2: shape (L, E, 1 or 2), 0 for none.
+
+    With K_1 / r^3 and K_2 / r^3 the sides' signals, K their difference, the noise over the squared contrast is
+    sigma^2 r^6 / K^2 + gain (K_1 + K_2) / 2 r^3 / K^2, times what the end of the scale makes of it.
+    """
+    pictures = Pictures.of(scene, sensor, lights)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if model == "paper":
+            inverse = 1 / paper_step(pictures, names)[..., None] ** 2
+        else:
+            sides = side_strengths(pictures, names)
+            kinds = [np.ones(sides.shape[:-1]), sides.sum(-1) / 2][: 2 if scene.noise.gain > 0 else 1]
+            inverse = np.stack(kinds, -1) / (sides[..., :1] - sides[..., 1:]) ** 2
+            inverse *= _cut_off(scene, sides, edge_distance2(pictures, names, np.linspace(0, 1, 9)))[..., None]
+    return np.where(np.isfinite(inverse).all(-1, keepdims=True), inverse, 0.0)
+
+
+def _cut_off(scene: Scene, sides: np.ndarray, r2: np.ndarray) -> np.ndarray:
+    """Least factor by which the end of the scale changes noise over squared contrast along an edge, (L, E); 1 mostly.
+
+    The factor is smooth along an edge: 9 points and 2 % to spare.
+    """
+    hot = sides.max(-1) > 0.99 * headroom(scene.noise) * r2.min(-1) ** 1.5
+    factor = np.ones(hot.shape)
+    signals = sides[hot][..., None] / r2[hot][:, None] ** 1.5
+    found = of_sides(scene, signals)
+    plain = (scene.noise.variance + shot_noise(scene.noise, signals.mean(-2))) / (signals[:, 0] - signals[:, 1]) ** 2
+    ratio = found.noise_variance / found.squared / plain
+    factor[hot] = 0.98 * np.where(np.isfinite(ratio), ratio, np.inf).min(-1, initial=np.inf)
+    return np.minimum(factor, 1.0)
+
+
+def _nodes() -> np.ndarray:
+    """Chebyshev points on 0 to 1."""
+    return (1 - np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)) / 2
+
+
+def _lagrange(at: np.ndarray) -> np.ndarray:
+    """Lagrange's polynomials of the nodes at fractions (...), shape (..., _DEGREE)."""
+    nodes = _nodes()
+    parts = [np.prod([(at - m) / (n - m) for m in nodes if m != n], axis=0) for n in nodes]
+    return np.stack(parts, -1)
+
+
+def _light_part(scene: Scene, names: tuple[str, ...], lights: np.ndarray, model: str) -> np.ndarray:
+    """What an edge's bound takes from the light, shape (L, E, k)."""
+    pictures = Pictures.of(scene, np.zeros(2), lights)
+    if model == "paper":
+        points = np.linspace(0, 1, PAPER_POINTS)
+        inverse = 1 / edge_distance2(pictures, names, points)
+        mean = inverse.mean(-1, keepdims=True)
+        smooth = (inverse / mean**2) @ _lagrange(points)
+        return np.concatenate([1 / mean, smooth], -1)
+    cubes = edge_distance2(pictures, names, np.linspace(0, 1, 33)) ** 1.5
+    nodes = edge_distance2(pictures, names, _nodes())
+    gain = scene.noise.gain
+    dark = [np.ptp(cubes, axis=-1)[..., None] ** 2, nodes**3]
+    shot = [gain * np.ptp(np.sqrt(cubes), axis=-1)[..., None] ** 2, gain * nodes**1.5] if gain > 0 else []
+    return np.concatenate(dark + shot, -1)
+
+
+def _paper(pictures: Pictures, known: Measurands, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tangent at equal weights: 2 sum h^2 - sum h^2 w, h the weight of each point's error in A d + B theta."""
+    scene, sensors = pictures.scene, pictures.sensors
+    names, lengths = known.view.names, known.view.lengths[..., None]
+    fractions = np.linspace(0, 1, PAPER_POINTS)
+    part = np.empty((*a.shape, _DEGREE + 1))
+    for at in range(0, len(sensors), 1024):
+        s = slice(at, at + 1024)
+        points = lengths[s] * image_fractions(scene, names, sensors[s], fractions)
+        places = lengths[s] * image_fractions(scene, names, sensors[s], _nodes())
+        for m in range(a.shape[1]):
+            influence = _influence(points, a[s, m], b[s, m], points)
+            nodes = _influence(places, a[s, m], b[s, m], points)
+            missed = np.abs(influence - nodes @ _lagrange(fractions).T).max(-1)
+            part[s, m, :, 0] = 2 * influence.sum(-1) - 1.5 * PAPER_POINTS * missed
+            part[s, m, :, 1:] = -nodes
+    return part * PAPER_KAPPA2 * scene.noise.sigma**2, (lengths > 0).all((-1, -2))
+
+
+def _influence(u: np.ndarray, a: np.ndarray, b: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """h^2 of A d + B theta at places u (px) for the unweighted line through ``points`` (px)."""
+    mean = points.mean(-1, keepdims=True)
+    a, b = a[..., None], b[..., None]
+    return (a / points.shape[-1] + (b - a * mean) * (u - mean) / ((points - mean) ** 2).sum(-1, keepdims=True)) ** 2
+
+
+def _calibrated(pictures: Pictures, known: Measurands, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of r^6 and of r^3 at the interpolation's nodes; the first of each takes the square of its range.
+
+    r^3 itself is no polynomial of the place: what the interpolation misses of it is 1e-9.
+    """
+    scene, scale = pictures.scene, pictures.scene.locator.scale_px
+    nodes = place_nodes(pictures, known.view, known.view.framed)
+    good = (nodes.length[..., 0] >= MIN_USABLE).all(-1)
+    per_point = point_variance(nodes, scale) * np.ones(1)
+    part = np.stack([_coefficients(nodes, a[:, m], b[:, m], per_point, scale, good) for m in range(a.shape[1])], 1)
+    dark = scene.noise.variance * part
+    return np.concatenate([dark, part], -1) if scene.noise.gain > 0 else dark, good
+
+
+def _coefficients(
+    nodes: EdgeNodes, a: np.ndarray, b: np.ndarray, per_point, scale: float, good: np.ndarray
+) -> np.ndarray:
+    """Those of r^6 for A d + B theta of each edge at unit noise, shape (S, E, 1 + _DEGREE)."""
+    weight, slope = (make(nodes, a, b) for make in (line_weight, line_slope))
+    factor = long_edge(nodes, weight, slope, scale) * per_point
+    extra = np.zeros_like(nodes.length)
+    short = good & np.isfinite(nodes.length[..., 0]).all(-1) & (nodes.length[..., 0] < SHORT * scale).any(-1)
+    inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * nodes.length / 2
+    weighted = weight * inside * np.sqrt(per_point)
+    crowd, spare = _short(weighted[short], nodes.t[short], scale)
+    is_short = nodes.length[short] < SHORT * scale
+    factor[short] = np.where(is_short, crowd, factor[short])
+    extra[short] = np.where(is_short, -spare, 0.0)
+    values = np.einsum("...j,...jk->...k", factor, _lagrange(nodes.spatial))
+    return np.concatenate([extra, values], -1)
+
+
+def _short(weighted: np.ndarray, t: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Short edges: r^3 r'^3 = (r^6 + r'^6) / 2 - (r^3 - r'^3)^2 / 2; coefficients of r^6, and the most of the rest."""
+    kernel = weighted[..., :, None] * weighted[..., None, :] * correlation(t[..., :, None] - t[..., None, :], scale)
+    return kernel.sum(-1), np.abs(kernel).sum((-1, -2))[..., None] / 2

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from imaging.geometry.projection import direction
-from planner.search.constraints import WHOLE, Constraints
+from planner.constraints import WHOLE, Constraints
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.arrays import finite, number
 from scenes.errors import given
@@ -78,11 +78,6 @@ class Directions(ABC):
         """Indices of the directions next to one."""
         near = self._tree.query_ball_point(self.directions[index], 2 * np.sin(np.radians(self._reach) / 2))
         return np.array([i for i in near if i != index], int)
-
-    @cached_property
-    def neighbour_pairs(self) -> np.ndarray:
-        """All pairs of directions that are neighbours, shape (M, 2)."""
-        return self._tree.query_pairs(2 * np.sin(np.radians(self._reach) / 2), output_type="ndarray")
 
     @property
     def _reach(self) -> float:

@@ -20,7 +20,7 @@ from imaging.features.measurand import measurands
 from imaging.features.projected_edges import circles
 from imaging.geometry.projection import edge_points
 from imaging.light.appearance import of_sides, side_signals
-from imaging.models.along import NODE_WEIGHTS, Nodes, place_nodes
+from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
 from imaging.models.calibrated import line_slope, line_weight, long_edge, point_variance
 from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
@@ -184,7 +184,7 @@ class _Contrasts:
             for scene, places in zip(self.lone, self.places, strict=True)
         ]
 
-    def _weights(self, nodes: Nodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def _weights(self, nodes: EdgeNodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Of 1 / C^2 at the nodes, (2, E, n): of a long edge, and to first order, which is never negative."""
         scale = self.scene.locator.scale_px
         weight, point = line_weight(nodes, a, b), point_variance(nodes, scale)

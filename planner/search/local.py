@@ -168,7 +168,7 @@ def shifted(pose: np.ndarray, by_deg: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Step:
+class SearchStep:
     """One row of the paper's Table 1: what was held fixed, what was found, and the variance there."""
 
     fixed: str
@@ -185,7 +185,7 @@ class Partial:
     sensor: int
     light: int
     variance: float
-    trace: tuple[Step, ...]
+    trace: tuple[SearchStep, ...]
 
 
 def alternating(
@@ -208,7 +208,7 @@ def alternating(
     """
     at = [sensors.nearest(start), 0 if first_light is None else lights.nearest(first_light)]
     spaces, roles = (sensors, lights), ("sensor", "light")
-    trace: list[Step] = []
+    trace: list[SearchStep] = []
     for turn in range(_MOST_TURNS):
         moving, fixed = (1, 0) if turn % 2 == 0 else (0, 1)
 
@@ -220,7 +220,7 @@ def alternating(
         before = at[moving]
         at[moving], variance = _downhill(spaces[moving], before, value)
         poses = [Pose(*map(float, space.poses[k])) for space, k in zip(spaces, at, strict=True)]
-        trace.append(Step(roles[fixed], poses[fixed], roles[moving], poses[moving], variance))
+        trace.append(SearchStep(roles[fixed], poses[fixed], roles[moving], poses[moving], variance))
         if at[moving] == before and turn:
             break
     return Partial(*at, trace[-1].variance, tuple(trace))

@@ -16,7 +16,7 @@ import numpy as np
 from imaging.models import variance_model
 from imaging.models.errors import Errors
 from imaging.pictures import Pictures
-from planner.search.constraints import UNCONSTRAINED, Constraints
+from planner.constraints import UNCONSTRAINED, Constraints
 from planner.search.grid import by_light
 from scenes import InvalidInput, Quantity, Scene
 from scenes.errors import given

@@ -15,10 +15,9 @@ import numpy as np
 
 from imaging.geometry.projection import direction
 from planner.prediction import Prediction, predict
-from planner.search.candidates import DEAREST
+from planner.search.candidates import DEAREST, SettingUp
 from planner.search.local import refine
 from planner.search.objective import Aim, Report, SearchProblem
-from planner.search.setting_up import SettingUp
 from scenes.status import is_trusted
 
 MOST_SETS = 200_000  # that are tried one by one
@@ -32,7 +31,7 @@ _LESS = 1 - 1e-9  # times what is minimised: what differs less is the same
 
 
 @dataclass(frozen=True, eq=False)
-class Information:
+class PictureInformation:
     """What each of P pictures tells of each of M quantities: 1 / (share x variance), so that information adds.
 
     Attributes
@@ -52,13 +51,13 @@ class Information:
     def __len__(self) -> int:
         return len(self.ok)
 
-    def only(self, rows: np.ndarray) -> Information:
+    def only(self, rows: np.ndarray) -> PictureInformation:
         """Some of the pictures."""
-        return Information(self.ok[rows], self.clutter[rows], self.over)
+        return PictureInformation(self.ok[rows], self.clutter[rows], self.over)
 
-    def together(self, rows: list[int]) -> Information:
+    def together(self, rows: list[int]) -> PictureInformation:
         """What some of the pictures tell together, one row."""
-        return Information(self.ok[rows].sum(0)[None], self.clutter[rows].sum(0)[None], self.over)
+        return PictureInformation(self.ok[rows].sum(0)[None], self.clutter[rows].sum(0)[None], self.over)
 
     def of_sets(self, members: np.ndarray) -> Score:
         """Of sets of pictures, indices (..., K)."""
@@ -115,7 +114,7 @@ def better(one: tuple[int, float, float], other: tuple[int, float, float]) -> bo
     return one[2] < _LESS * other[2]
 
 
-def front(table: Information) -> np.ndarray:
+def front(table: PictureInformation) -> np.ndarray:
     """Indices of the pictures that no other one can stand in for in every set without making it worse.
 
     One can that tells at least as much of every quantity; where a quantity is clutter in some picture, it must not be
@@ -139,7 +138,7 @@ def front(table: Information) -> np.ndarray:
     return np.array(chosen, int)
 
 
-def greedy(table: Information, count: int) -> tuple[tuple[int, ...], ...]:
+def greedy(table: PictureInformation, count: int) -> tuple[tuple[int, ...], ...]:
     """For 1, 2, ... ``count`` pictures a set that no exchange of one picture for another makes better.
 
     Each is the best of the one before with one picture more, and of sets that begin with the picture that sees one
@@ -162,13 +161,13 @@ def greedy(table: Information, count: int) -> tuple[tuple[int, ...], ...]:
     return tuple(chosen)
 
 
-def _filled(table: Information, members: tuple[int, ...], size: int) -> tuple[int, ...]:
+def _filled(table: PictureInformation, members: tuple[int, ...], size: int) -> tuple[int, ...]:
     while len(members) < size:
         members = (*members, table.with_each(members).best())
     return members
 
 
-def _exchanged(table: Information, members: tuple[int, ...]) -> tuple[int, ...]:
+def _exchanged(table: PictureInformation, members: tuple[int, ...]) -> tuple[int, ...]:
     """One picture at a time is exchanged for the best other one until none makes the set better."""
     here = table.of_sets(np.array(members)).at(0)
     moved = True
@@ -192,7 +191,7 @@ def sets_of(pictures: int, count: int) -> int:
     return math.comb(pictures + count - 1, count)
 
 
-def every_set(table: Information, count: int) -> tuple[int, ...]:
+def every_set(table: PictureInformation, count: int) -> tuple[int, ...]:
     """The best of all sets of ``count`` pictures, tried one by one."""
     best: tuple[int, ...] = ()
     least = (len(table.ok[0]) + 1, math.inf, math.inf)
@@ -209,7 +208,7 @@ def _chunks(sets: Iterator[tuple[int, ...]]) -> Iterator[np.ndarray]:
         yield np.array(some)
 
 
-def least_value(table: Information, count: int) -> float:
+def least_value(table: PictureInformation, count: int) -> float:
     """What no set of ``count`` pictures that measures every quantity can stay below, whatever the search.
 
     Pictures are counted in parts, ``count`` in all (`_relaxed`); infinite where some quantity is never measured.
@@ -298,8 +297,8 @@ def undominated_shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np
     return np.concatenate(rows)
 
 
-def all_ok(told: np.ndarray, aim: Aim) -> Information:
-    return Information(told, np.zeros_like(told), aim.over)
+def all_ok(told: np.ndarray, aim: Aim) -> PictureInformation:
+    return PictureInformation(told, np.zeros_like(told), aim.over)
 
 
 class Pool:
@@ -344,16 +343,16 @@ class Pool:
         """Ray-traced rows, in their order."""
         return np.array(sorted(self.traced), int)
 
-    def known(self) -> Information:
+    def known(self) -> PictureInformation:
         """What the rows `seen` tell, of what is measured around them, too, where any of them does."""
         told = [self.traced[row].measurands for row in self.seen]
         values = information(np.array([[each.variance_object for each in row] for row in told]), self.problem.objective)
         steady = np.array([self.steady[row] for row in self.seen])
         values = np.where(steady | ~steady.any(0), values, 0.0)
         fine = np.array([[is_trusted(each.status) for each in row] for row in told])
-        return Information(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.objective.over)
+        return PictureInformation(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.objective.over)
 
-    def expected(self) -> Information:
+    def expected(self) -> PictureInformation:
         """What all rows tell: ray-traced, else by fast evaluation, cluttered as the nearest ray-traced row is."""
         cluttered = np.zeros(self.told.shape, bool)
         seen = self.seen
@@ -367,14 +366,14 @@ class Pool:
         ok, clutter = np.where(cluttered, 0.0, self.told), np.where(cluttered, self.told, 0.0)
         if len(seen):
             ok[seen], clutter[seen] = known.ok, known.clutter
-        return Information(ok, clutter, self.problem.objective.over)
+        return PictureInformation(ok, clutter, self.problem.objective.over)
 
-    def refine(self, row: int, rest: Information, step_deg: float) -> int:
+    def refine(self, row: int, rest: PictureInformation, step_deg: float) -> int:
         """The row after a local search of its poses, or itself where that finds nothing better; the row's number.
 
         Parameters
         ----------
-        rest : Information
+        rest : PictureInformation
             One row: what the other pictures of its set tell.
 
         What is clutter in the row is taken to stay so on the way. If ray-traced evaluation does not bear out what the

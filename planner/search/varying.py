@@ -15,9 +15,8 @@ from itertools import islice, product
 import numpy as np
 
 from imaging.geometry.projection import direction
-from planner.search.candidates import DEAREST, RayTraced
-from planner.search.constraints import WHOLE
-from planner.search.design import (
+from planner.constraints import WHOLE
+from planner.design import (
     Choice,
     Chosen,
     Hold,
@@ -28,10 +27,10 @@ from planner.search.design import (
     own_choice,
     with_choice,
 )
+from planner.search.candidates import DEAREST, RayTraced, SettingUp
 from planner.search.grid import APART, ViewingSpace, distinct
 from planner.search.local import Start, descend
 from planner.search.objective import Report, SearchProblem, cut_off, minimised
-from planner.search.setting_up import SettingUp
 from scenes import Pose, Scene
 
 ANGLE_STEP = 30.0  # degrees, of either polariser

@@ -10,7 +10,7 @@ GUM (JCGM 100) for the budget, JCGM 101 for Monte Carlo and the comparison, JCGM
 """
 
 from planner.uncertainty.budget import Budget, Contribution, budget, coverage_factor, effective_dof
-from planner.uncertainty.capability import Gauge, gauge, tur, uncertainty_ratio
+from planner.uncertainty.capability import Gauge, gauge, tur
 from planner.uncertainty.conformity import decide
 from planner.uncertainty.groups import Group, Source, draw, members
 from planner.uncertainty.improve import Improvement, Needed, improvements, needed, scaled
@@ -23,7 +23,7 @@ from planner.uncertainty.monte_carlo import (
     numerical_tolerance,
     shortest_interval,
 )  # fmt: skip
-from planner.uncertainty.risks import Limits, Risks, global_risks, nonconforming_probability, posterior
+from planner.uncertainty.risks import Limits, Risks, global_risks, nonconforming_probability
 from planner.uncertainty.ufloats import as_ufloats
 from planner.uncertainty.validation import Validation, validate
 
@@ -31,6 +31,6 @@ __all__ = [
     "Budget", "Contribution", "Enough", "Gauge", "Group", "Improvement", "Input", "Limits", "MonteCarlo", "Needed",
     "Risks", "Source", "Validation", "as_ufloats", "budget", "coverage_factor", "decide", "draw", "effective_dof",
     "gauge", "global_risks", "improvements", "members", "monte_carlo", "monte_carlo_all", "needed",
-    "nonconforming_probability", "numerical_tolerance", "posterior", "scaled", "shortest_interval", "tur",
-    "uncertainty_ratio", "validate",
+    "nonconforming_probability", "numerical_tolerance", "scaled", "shortest_interval", "tur",
+    "validate",
 ]  # fmt: skip

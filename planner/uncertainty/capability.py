@@ -49,11 +49,6 @@ def tur(width: float, U: float) -> float:
     return width / (2 * U)
 
 
-def uncertainty_ratio(width: float, U: float) -> float:
-    """U / T, expanded uncertainty over the tolerance's whole width: 1 / (2 TUR)."""
-    return 1 / (2 * tur(width, U))
-
-
 def gauge(repeats: Sequence[float] | np.ndarray, reference: float, width: float) -> Gauge:
     """Cg and Cgk of repeated measurements, by the convention of 20 % of the tolerance and six standard deviations.
 

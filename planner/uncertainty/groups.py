@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,23 +58,6 @@ class Group:
             raise InvalidInput(f"{name}: kind must be the same for all inputs of a group, got {sorted(kinds)}")
         matrix = _correlation(self.correlation, len(self.inputs), name)
         object.__setattr__(self, "correlation", tuple(tuple(row) for row in matrix.tolist()))
-
-    @classmethod
-    def from_covariance(
-        cls, names: Sequence[str], values: Sequence[float], covariance: np.ndarray, name: str = "", **kinds: object
-    ) -> Group:
-        """Normal inputs of a covariance matrix, shape (n, n), in the values' units squared; `kinds` as Input's."""
-        covariance = np.asarray(covariance, float)
-        if covariance.shape != (len(names), len(names)) or len(values) != len(names):
-            raise InvalidInput(f"covariance must be of shape {(len(names), len(names))}, got {covariance.shape}")
-        if not (np.isfinite(covariance).all() and (np.diag(covariance) >= 0).all()):
-            raise InvalidInput("covariance must be finite with variances of at least 0, got other values")
-        u = np.sqrt(np.diag(covariance))
-        scale = np.where(u > 0, u, 1.0)
-        correlation = covariance / np.outer(scale, scale)
-        np.fill_diagonal(correlation, 1.0)
-        inputs = tuple(Input(*each, **kinds) for each in zip(names, map(float, values), u.tolist(), strict=True))
-        return cls(inputs, correlation, name)
 
     @property
     def kind(self) -> str:

@@ -78,7 +78,7 @@ class Risks:
 def nonconforming_probability(value: float, u: float, tolerance: Limits) -> float:
     """Specific risk: that a part measured as `value` with standard uncertainty u is outside (JCGM 106 7.2, 9.3).
 
-    Without knowledge of the process; with it, give `posterior(value, u, mean, spread)`.
+    Without knowledge of the process; with it, give the part's best estimate and u by both (JCGM 106 A.4.4).
 
     >>> round(nonconforming_probability(10.02, 0.004, Limits(9.98, 10.02)), 3)
     0.5
@@ -86,18 +86,6 @@ def nonconforming_probability(value: float, u: float, tolerance: Limits) -> floa
     check_positive("u", u)
     below, above = (tolerance.lower - value) / u, (value - tolerance.upper) / u
     return float(special.ndtr(below) + special.ndtr(above))
-
-
-def posterior(value: float, u: float, mean: float, spread: float) -> tuple[float, float]:
-    """Best estimate and standard uncertainty of a part of a normal process, after its measurement (JCGM 106 A.4.4).
-
-    >>> [round(x, 6) for x in posterior(10.02, 0.01, 10.0, 0.01)]
-    [10.01, 0.007071]
-    """
-    check_positive("u", u)
-    check_positive("spread", spread)
-    weight = 1 / (1 + (u / spread) ** 2)
-    return mean + weight * (value - mean), u * math.sqrt(weight)
 
 
 def global_risks(mean: float, spread: float, u: float, tolerance: Limits, acceptance: Limits | None = None) -> Risks:

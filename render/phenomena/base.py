@@ -32,7 +32,7 @@ EVERYTHING = Influence(float("inf"), float("inf"))
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class EffectTolerance:
     """What may be left out: at most this change of the mean (px) and this relative change of the variance."""
 
     bias_px: float = 0.005

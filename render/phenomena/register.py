@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imaging.pictures import Pictures
-from render.phenomena.base import EFFECTS, EVERYTHING, NOTHING, Effect, Influence, Tolerance
+from render.phenomena.base import EFFECTS, EVERYTHING, NOTHING, Effect, EffectTolerance, Influence
 from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion
 from render.phenomena.pose import PoseJitter
 from render.phenomena.sensor import FixedPattern, Quantisation, ReadNoise, Saturation, ShotNoise
@@ -57,7 +57,7 @@ class Decision:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChosenEffects:
     """The scene reduced to the effects that are simulated, their names, and why."""
 
     scene: Scene
@@ -66,7 +66,7 @@ class Choice:
 
 
 def effects(
-    scene: Scene, tolerance: Tolerance = Tolerance(), wanted: str | Iterable[str] = "auto"
+    scene: Scene, tolerance: EffectTolerance = EffectTolerance(), wanted: str | Iterable[str] = "auto"
 ) -> tuple[Decision, ...]:
     """Which effects the scene's settings call for, all settings together, or which the user wants instead.
 
@@ -90,13 +90,15 @@ def effects(
     return found if asked is None else tuple(_overruled(decision, asked) for decision in found)
 
 
-def choose(scene: Scene, wanted: str | Iterable[str], tolerance: Tolerance, picture: Picture | None = None) -> Choice:
+def choose(
+    scene: Scene, wanted: str | Iterable[str], tolerance: EffectTolerance, picture: Picture | None = None
+) -> ChosenEffects:
     """Reduce a scene to the wanted effects.
 
     Parameters
     ----------
     wanted : {"auto", "all"} or iterable of str
-    tolerance : Tolerance
+    tolerance : EffectTolerance
         What ``auto`` may leave out.
     picture : Picture, optional
         Decide for one setting; for all of the scene's when not given.
@@ -114,7 +116,7 @@ def choose(scene: Scene, wanted: str | Iterable[str], tolerance: Tolerance, pict
     reduced = scene
     for name in set(EFFECTS) - active:
         reduced = EFFECTS[name].without(reduced)
-    return Choice(reduced, active, decisions)
+    return ChosenEffects(reduced, active, decisions)
 
 
 def named(wanted: str | Iterable[str]) -> frozenset[str]:
@@ -146,11 +148,11 @@ def of_settings(scene: Scene, *pictures: Picture) -> Pictures:
     return Pictures(scene, np.array([list(p.sensor) for p in pictures]), lights)
 
 
-def _decisions(pictures: Pictures, tolerance: Tolerance) -> tuple[Decision, ...]:
+def _decisions(pictures: Pictures, tolerance: EffectTolerance) -> tuple[Decision, ...]:
     return tuple(_decide(effect, pictures, tolerance) for effect in map(EFFECTS.__getitem__, EFFECTS))
 
 
-def _decide(effect: Effect, pictures: Pictures, tolerance: Tolerance) -> Decision:
+def _decide(effect: Effect, pictures: Pictures, tolerance: EffectTolerance) -> Decision:
     absent = effect.absent(pictures)
     if absent is not None:
         return Decision(effect, False, absent, NOTHING)

@@ -20,11 +20,11 @@ from scipy.special import ndtr
 
 from imaging.geometry.projection import project
 from measure import ESTIMATORS
-from measure.bounds import corner_bound
 from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared
 from measure.measurement import separation
+from tests.galsim_images import corner_bound
 from tests.oracle import polygon_image
 
 SHAPE = (112, 152)
@@ -84,7 +84,8 @@ def trial(corners, estimator: str, ratio: float, count: int, rng, blur: float = 
         shape = find_shape(noisy, layout, estimator, threshold)
         values.append(np.where(np.isin(shape.status, ("ok", "clutter")), diagonal(shape)[0], np.nan))
     values = np.concatenate(values)
-    covariance = corner_bound(layout, ratio * SIGMA, SIGMA**2)[np.ix_([0, 1, 4, 5], [0, 1, 4, 5])]
+    covariance = corner_bound(corners, lambda at: polygon_image(at, SHAPE, blur, 1.0), ratio)
+    covariance = covariance[np.ix_([0, 1, 4, 5], [0, 1, 4, 5])]
     _, gradient = separation(corners[None, [0, 2]])
     good = values[np.isfinite(values)]
     return Trial(

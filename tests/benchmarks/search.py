@@ -25,7 +25,7 @@ def local_minima(space: ViewingSpace, values: np.ndarray) -> np.ndarray:
 
     Directions of equal value that touch (such as azimuth 0 and 360 on the equator) count as one.
     """
-    a, b = space.neighbour_pairs.T
+    a, b = np.array([(i, j) for i in range(len(space)) for j in space.neighbours(i) if i < j]).T
     beaten = np.zeros(len(values), bool)
     beaten[a[values[b] < values[a]]] = True
     beaten[b[values[a] < values[b]]] = True

@@ -547,12 +547,11 @@ ARRAYS = {
     [
         lambda image: measure.distance(image, scenes.load("task1"), (30, 135)),
         lambda image: measure.propagate(image, scenes.load("task1"), (30, 135)),
-        lambda image: measure.image_bound(image, scenes.load("task1"), (30, 135), (15, 315)),
         measure.measure_quadrilateral,
         lambda image: render.expose(image, Noise(sigma=1.0), np.random.default_rng(1), 1),
         lambda image: render.variance(image, Noise(sigma=1.0)),
     ],
-    ids=["distance", "propagate", "image_bound", "measure_quadrilateral", "expose", "variance"],
+    ids=["distance", "propagate", "measure_quadrilateral", "expose", "variance"],
 )  # fmt: skip
 def test_what_is_no_image_is_refused(what, use, request):
     if what == "colour" and "variance" in request.node.name:

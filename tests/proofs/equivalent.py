@@ -143,8 +143,8 @@ EQUIVALENT: dict[str, str] = {
         "what is not above 0 is limited in the next line",
     "measure/fitting/noise.py: dark, gain = min(float(np.average(variance, weights=freedom)), 1e-9), 0.0":
         "where rounds of scoring begin that end at one place",
-    "planner/search/bound.py: _DEGREE = 8  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the "
-    "smooth functions here": "one degree more of what is exact",
+    "planner/search/exhaustive.py: _DEGREE = 8  # of the interpolation along an edge: exact for r^6, and about 1e-9 "
+    "for the smooth functions here": "one degree more of what is exact",
     "validation/cost/size.py: work.measure_chunk(sized, image, seed, 0, 3)":
         "how many images are measured first, whose time does not count",
     "measure/features/blurred_ellipse.py: return places, normals / np.linalg.norm(normals, axis=1, keepdims=True)":

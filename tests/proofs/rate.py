@@ -17,7 +17,7 @@ from render import variant as variants
 from validation import run
 from validation.batch import pool, work
 from validation.batch.campaign import Campaign, Grid
-from validation.batch.work import CHUNK, Task
+from validation.batch.work import CHUNK, Chunks
 
 
 def rate(
@@ -72,8 +72,8 @@ def _bare(campaign: Campaign, renders: int, sample: int) -> tuple[float, float]:
     """Images a second, and processor seconds an image, of one process that does the same work and stores nothing."""
     chunks = tuple((i, min(CHUNK, renders - first)) for i, first in enumerate(range(0, renders, CHUNK)))
     picked = np.unique(np.linspace(0, len(campaign) - 1, sample).astype(int)).tolist()
-    tasks = [Task(campaign.case(i), chunks, 1, variants.choose()) for i in picked]
-    work.perform(Task(tasks[0].case, ((0, 1),), 1, variants.choose()))  # loads the renderer
+    tasks = [Chunks(campaign.case(i), chunks, 1, variants.choose()) for i in picked]
+    work.perform(Chunks(tasks[0].case, ((0, 1),), 1, variants.choose()))  # loads the renderer
     started, cpu = time.perf_counter(), _cpu()
     for task in tasks:
         work.perform(task)

@@ -63,7 +63,7 @@ def test_what_surfaces_send_to_each_other_has_no_noise_of_the_direct_light(monke
     assert light.min() >= 0
     assert light.max() > 10, "levels"  # margin: seen, not black: 34 levels
     monkeypatch.undo()
-    active = render.choose(here.scene, "auto", render.Tolerance(), here).active
+    active = render.choose(here.scene, "auto", render.EffectTolerance(), here).active
     many = replace(FEW, supersample=4, edge_samples=64, random_samples=64, alike=False, everywhere=True)
     with_, without = (
         render.image(here, quality=many, variant=SCALAR, effects=effects)[rows_columns]

@@ -101,13 +101,3 @@ def test_points_on_a_line_are_refused():
 def test_bad_points(points, line):
     with pytest.raises(InvalidInput, match=line):
         measure.fit_ellipse(points)
-
-
-def test_distance_between_centre_and_corner(rng):
-    """Monte Carlo of eq. 6 with unequal, correlated errors; 20000 draws, standard error 1 %."""
-    first, second = np.array([10.0, 20.0]), np.array([80.0, 45.0])
-    a, b = np.array([[0.04, 0.01], [0.01, 0.02]]), np.array([[0.01, -0.005], [-0.005, 0.03]])
-    _, variance = measure.point_distance(first, a, second, b)
-    p, q = rng.multivariate_normal(first, a, 20000), rng.multivariate_normal(second, b, 20000)
-    assert np.linalg.norm(q - p, axis=1).var(ddof=1) == pytest.approx(variance, rel=0.04)
-    assert np.linalg.norm(q - p, axis=1).var(ddof=1) != pytest.approx(1.3 * variance, rel=0.04)

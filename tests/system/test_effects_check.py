@@ -5,7 +5,7 @@ import pytest
 import render
 import scenes
 from render import variant
-from render.phenomena import Tolerance
+from render.phenomena import EffectTolerance
 from scenes import Floor, Lens
 from validation.effects_check import RENDERED, Switched, check
 
@@ -31,7 +31,10 @@ def test_left_out_effects_are_within_their_bounds(name, only):
 
 def test_light_of_some_size_is_within_its_bound(task1):
     """Radius 4 cm at 100 cm, left out by a wide tolerance, and 15 cm, which a face's horizon cuts off."""
-    quality, wide = render.Quality(supersample=2, samples=1, edge_samples=4, random_samples=4), Tolerance(1e9, 1e9)
+    quality, wide = (
+        render.Quality(supersample=2, samples=1, edge_samples=4, random_samples=4),
+        EffectTolerance(1e9, 1e9),
+    )
     scene = task1.model_copy(update={"light": task1.light.model_copy(update={"radius": 4.0})})
     (row,) = check(scene, wide, quality, task1.settings[5:6], only=("light_size",))
     assert row.holds, row
@@ -45,7 +48,7 @@ def test_light_of_some_size_is_within_its_bound(task1):
 
 def test_bounds_hold_where_they_are_not_zero(task1):
     """Distortion and a dark floor, left out by a wide tolerance: each is measurable and within its bound."""
-    wide, lens = Tolerance(1e9, 1e9), Lens(distortion=-0.05)
+    wide, lens = EffectTolerance(1e9, 1e9), Lens(distortion=-0.05)
     cases = {
         "lens_distortion": task1.model_copy(update={"camera": task1.camera.model_copy(update={"lens": lens})}),
         "floor": task1.model_copy(update={"floor": Floor(reflectance=0.02, height=-3.0)}),

@@ -67,7 +67,8 @@ def test_canny_weighs_its_pixels_by_the_length_they_stand_for(rng):
     corners = rectangle(100, 60, 22.5)
     tool = prepared(polygon_layout(corners, Optics(SHAPE, 0.7, 1.0)), "canny", 8.0)
     clean = polygon_image(corners, SHAPE, 0.7, 80.0)
-    responses = [part.respond(clean)[1] for part in tool.parts]
+    every = np.arange(clean.size)
+    responses = [part.respond_within(clean, every)[1] for part in tool.parts]
     linear, ours, equal = [], [], []
     for _ in range(40):
         noise = rng.standard_normal((50, *SHAPE))
@@ -172,7 +173,7 @@ def test_stated_covariance_where_the_contrast_varies(estimator):
     corners = rectangle(100, 60, 3)
     layout = polygon_layout(corners, Optics(SHAPE, 0.7, 4.0))
     tool, image = prepared(layout, estimator, 5.0), ramped(50.0, 100.0, corners)
-    estimate, response = tool.estimate(image[None]), tool.respond(image)
+    estimate, response = tool.estimate(image[None]), tool.respond_within(image)
     expected = layout.optics.noise_variance * np.diag(response @ response.T)
     # margin: first order in the change of contrast, 1.3 %; the control is beyond 10 %
     assert np.diag(tool.covariance(estimate, image[None])[0]) == pytest.approx(expected, rel=0.05)
@@ -224,6 +225,14 @@ def test_any_kind_of_number(task1, kind):
     assert measure.distance(image, task1, (31, 137), estimator="arrangement").status == status.OK
 
 
+def _angle(shape):
+    """Of the first two lines, degrees, and its variance by their joint covariance, degrees^2, (n,)."""
+    a, b = shape.normals[:, 0], shape.normals[:, 1]
+    tilts = shape.lines[:, 1:4:2, 1:4:2]
+    angle = np.arctan2(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.abs((a * b).sum(1)))
+    return np.degrees(angle), np.degrees(np.degrees([1, -1] @ tilts @ [1, -1]))
+
+
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_angle_between_two_lines(rng, estimator):
     """Angle of a corner and its variance, 2000 images; standard error 3.2 %."""
@@ -232,12 +241,10 @@ def test_angle_between_two_lines(rng, estimator):
     clean = polygon_image(corners, SHAPE, 0.7, 60.0)
     along = np.roll(corners, -1, 0) - corners
     true = np.degrees(np.arccos(abs(along[0] @ along[1]) / np.linalg.norm(along[0]) / np.linalg.norm(along[1])))
-    value, predicted = measure.line_angle(find_shape(clean[None], layout, estimator), 0, 1)
+    value, predicted = _angle(find_shape(clean[None], layout, estimator))
     assert value[0] == pytest.approx(true, abs=0.01)
     noisy = clean + 2 * rng.standard_normal((2000, *SHAPE))
-    found = np.concatenate(
-        [measure.line_angle(find_shape(noisy[i : i + 50], layout, estimator), 0, 1)[0] for i in range(0, 2000, 50)]
-    )
+    found = np.concatenate([_angle(find_shape(noisy[i : i + 50], layout, estimator))[0] for i in range(0, 2000, 50)])
     ratio = found.var(ddof=1) / predicted[0]
     assert abs(ratio - 1) < 4 * np.sqrt(2 / 1999)  # margin: 4 standard errors
     assert abs(ratio / 1.3 - 1) > 4 * np.sqrt(2 / 1999)  # margin: 30 % are 7 standard errors

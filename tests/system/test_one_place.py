@@ -25,7 +25,6 @@ def forget():
 
 def _forget():
     pictures._of_picture.cache_clear()
-    measure.features.layout.layout_of.cache_clear()
 
 
 def contrasts(scene):

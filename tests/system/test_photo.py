@@ -5,7 +5,7 @@ import pytest
 
 import measure
 from measure.find.search import find_quadrilateral
-from measure.photo.lens import Lens
+from measure.photo.lens import Intrinsics
 from measure.photo.noise import noise_sigma
 from measure.photo.profiles import edge_sigma
 from scenes import InvalidInput
@@ -13,7 +13,7 @@ from tests.benchmarks.estimators import random_block
 from tests.oracle import polygon_image
 
 SHAPE = (240, 320)
-LENS = Lens(fx=400.0, fy=400.0, cx=160.0, cy=120.0, distortion=(-0.25, 0.08, 0.001, -0.0005))
+LENS = Intrinsics(fx=400.0, fy=400.0, cx=160.0, cy=120.0, distortion=(-0.25, 0.08, 0.001, -0.0005))
 
 
 def ring(corners):

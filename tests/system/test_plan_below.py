@@ -10,7 +10,7 @@ import trimesh
 
 import planner
 import scenes
-from planner.search.constraints import same_side
+from planner.constraints import same_side
 from scenes import Pose
 from tests.commands import ice
 

@@ -135,4 +135,4 @@ def test_bad_arguments(task1):
     with pytest.raises(InvalidInput, match=r"effects must be auto, all or some of .*, got 'fog'"):
         render.image(task1, (30, 135), (15, 315), effects="fog")
     with pytest.raises(InvalidInput, match="tolerance bias_px must be at least 0, got -1"):
-        render.Tolerance(bias_px=-1)
+        render.EffectTolerance(bias_px=-1)

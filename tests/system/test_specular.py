@@ -34,7 +34,7 @@ def test_bsdf_is_the_papers_reflectance(name, material):
     mitsuba = variant.use(name)
     import drjit as dr
 
-    surface = bsdf.Surface(material, plain(material), (0.0, 0.0, 100.0), sensor_angle=0.0)
+    surface = bsdf.Interaction(material, plain(material), (0.0, 0.0, 100.0), sensor_angle=0.0)
     made, context = mitsuba.load_dict(bsdf.describe(mitsuba, surface)), mitsuba.BSDFContext()
     hit = dr.zeros(mitsuba.SurfaceInteraction3f)
     hit.sh_frame = mitsuba.Frame3f(mitsuba.Normal3f(0, 0, 1))

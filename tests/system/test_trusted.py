@@ -5,8 +5,8 @@ import pytest
 
 import planner
 import scenes
+from planner.constraints import Constraints
 from planner.search.candidates import DEAREST, RayTraced, trusted
-from planner.search.constraints import Constraints
 from planner.search.objective import SearchProblem
 from validation.report.plan_table import report
 

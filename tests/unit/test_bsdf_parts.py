@@ -49,7 +49,7 @@ def test_a_texture_s_factor_is_of_the_matt_part_alone(analyser, light, sensor):
     table = Face(np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), np.full((2, 2), 1.4))
     values = []
     for texture in (None, table):
-        surface = bsdf.Surface(GLOSSY, known, place, sensor_angle=0.01, analyser=analyser, texture=texture)
+        surface = bsdf.Interaction(GLOSSY, known, place, sensor_angle=0.01, analyser=analyser, texture=texture)
         made = mitsuba.load_dict(bsdf.describe(mitsuba, surface))
         hit = dr.zeros(mitsuba.SurfaceInteraction3f)
         hit.sh_frame, hit.uv = mitsuba.Frame3f(mitsuba.Normal3f(0, 0, 1)), mitsuba.Point2f(0.3, 0.7)

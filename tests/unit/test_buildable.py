@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import planner
-from planner.search.constraints import Constraints
+from planner.constraints import Constraints
 from scenes import InvalidInput
 
 

@@ -19,7 +19,7 @@ from imaging.light.revolved import rings_of
 from imaging.models import bias
 from measure.estimators.profile import profile_kernel, top_kernel
 from planner.combining import combined
-from planner.search.bound import separable
+from planner.search.exhaustive import separable
 from planner.search.objective import Aim
 from render import curved
 from render.phenomena import transport

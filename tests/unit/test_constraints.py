@@ -9,7 +9,7 @@ import scenes
 from imaging.features.projected_edges import projected_edges
 from imaging.pictures import Pictures
 from planner import Constraints
-from planner.search.constraints import _clearance, _to_segment
+from planner.constraints import _clearance, _to_segment
 from scenes import InvalidInput
 from tests.oracle import axes, pinhole
 

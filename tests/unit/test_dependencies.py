@@ -2,12 +2,15 @@
 
 import ast
 import re
+import subprocess
 import sys
 import tomllib
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
+
+from validation.cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 OURS = ("scenes", "imaging", "planner", "render", "measure", "validation")
@@ -52,3 +55,15 @@ def test_it_would_be_seen(tmp_path):
     assert imported(tmp_path / "a.py") == {"hypothesis", "tests"}
     assert "hypothesis" not in {name(r) for r in ("numpy>=2.0,<3", "threadpoolctl>=3.5")}
     assert name("ice-vision[dask]") == "ice-vision"
+
+
+def test_what_a_command_may_say_is_known_before_anything_that_computes_is_loaded():
+    """Help and refusals of options wait for no package but `scenes` and what reads pictures.
+
+    Loading the others takes half a second.
+    """
+    modules = sorted({f"validation.cli.{module}" for module, _ in COMMANDS.values()})
+    code = f"import sys, {', '.join(modules)}; print(*sorted({{name.split('.')[0] for name in sys.modules}}))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {"scenes", "validation"} <= set(loaded)
+    assert {"imaging", "planner", "measure", "render", "scipy", "mitsuba", "matplotlib"} & set(loaded) == set()

@@ -7,7 +7,7 @@ import render
 import scenes
 from imaging.geometry.projection import direction
 from planner import Pictures
-from render.phenomena import EFFECTS, Tolerance, choose
+from render.phenomena import EFFECTS, EffectTolerance, choose
 from render.phenomena.edges import brightest
 from render.phenomena.register import of_settings
 from scenes import Floor, InvalidInput, Noise, Obstacle, Picture, Pose
@@ -26,7 +26,7 @@ NEEDED = {
 
 
 def active(scene, **tolerance):
-    return choose(scene, "auto", Tolerance(**tolerance), Picture.of(scene, SENSOR, LIGHT)).active
+    return choose(scene, "auto", EffectTolerance(**tolerance), Picture.of(scene, SENSOR, LIGHT)).active
 
 
 def test_register_has_every_effect_once():
@@ -61,7 +61,7 @@ def test_tolerance_decides(task1):
     scene = task1.model_copy(update={"floor": Floor(reflectance=1e-3)})
     assert "floor" in active(scene)
     assert not {"floor", "interreflection"} & active(scene, bias_px=0.1, variance=0.1)
-    assert choose(scene, "auto", Tolerance(0.1, 0.1), Picture.of(scene, SENSOR, LIGHT)).scene.floor is None
+    assert choose(scene, "auto", EffectTolerance(0.1, 0.1), Picture.of(scene, SENSOR, LIGHT)).scene.floor is None
 
 
 def test_decision_is_made_for_the_setting(task1):
@@ -77,11 +77,11 @@ def test_decision_is_made_for_the_setting(task1):
 
 
 def test_named_effects_and_bad_names(task1):
-    assert choose(task1, "floor,lens_blur", Tolerance()).active == {"floor", "lens_blur"}
-    assert choose(task1, ["floor"], Tolerance()).active == {"floor"}
-    assert choose(task1, "all", Tolerance()).active == set(EFFECTS)
+    assert choose(task1, "floor,lens_blur", EffectTolerance()).active == {"floor", "lens_blur"}
+    assert choose(task1, ["floor"], EffectTolerance()).active == {"floor"}
+    assert choose(task1, "all", EffectTolerance()).active == set(EFFECTS)
     with pytest.raises(InvalidInput, match=r"effects must be auto, all or some of .*, got 'fog'"):
-        choose(task1, "fog", Tolerance())
+        choose(task1, "fog", EffectTolerance())
     with pytest.raises(InvalidInput, match="settings must be a list of at least one"):
         render.effects(task1.model_copy(update={"settings": ()}))
 

@@ -118,7 +118,7 @@ def test_a_triangle_beside_facets_that_is_about_as_narrow_is_no_plane_face(area,
 
 @pytest.mark.parametrize(("turn", "is_chord"), [(28, False), (32, True), (78, True), (82, False)])
 def test_a_side_of_a_last_triangle_is_a_chord_unless_bends_run_along_it_or_square_to_it(turn, is_chord):
-    """Within 30 degrees of it, or 10 of the square: the facet is face 0, the others' sides at 55 degrees say nothing."""
+    """Within 30 degrees of it, or 10 of the square: the facet is face 0, the others' sides at 55 say nothing."""
     ways = [(np.cos(a), np.sin(a), 0) for a in np.radians([0, turn, 125])]
     shape, facet = sides([(0, 1), (0, 2), (0, 3)], ways), np.arange(4) != 1
     smooth = np.array([False, True, True])

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from imaging.models.along import NODES, Nodes
+from imaging.models.along import NODES, EdgeNodes
 from imaging.models.calibrated import _double_integral, _first_order, line_slope, line_weight, long_edge
 
 
 def nodes(length, middle):
     t = length / 2 * np.concatenate([[-1], NODES, [1]])
-    return Nodes(t[None], np.array([[middle]]), np.array([[length]]), None, 0.6, 1.0, 1.0)
+    return EdgeNodes(t[None], np.array([[middle]]), np.array([[length]]), None, 0.6, 1.0, 1.0)
 
 
 @pytest.mark.parametrize("cut", [0.0, -6.0])

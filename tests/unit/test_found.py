@@ -18,7 +18,6 @@ def test_nothing():
     }  # fmt: skip
     assert shape.status.tolist() == shape.whole.tolist() == [status.OK] * 3
     assert np.isnan(shape.p_value).all()
-    assert shape.tilt_covariance.shape == (3, 0, 0)
 
 
 @pytest.mark.parametrize("source", [[0, 1, 2, 1, 0], [2, 2, 1, 1, 1], [0, 0, 0, 0, 0]])
@@ -37,4 +36,3 @@ def test_each_image_comes_from_its_part(source, rng):
         assert whole.p_value[i] == parts[k].p_value[row]
         assert (whole.lines[i] == parts[k].lines[row]).all()
         assert whole.used[i].tolist() == [k]
-    assert whole.tilt_covariance == pytest.approx(whole.lines[:, 1::2, 1::2])

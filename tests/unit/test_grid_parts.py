@@ -15,10 +15,6 @@ def test_neighbours_are_within_1_6_steps(step):
         near = sorted(np.flatnonzero((apart < 1.6 * step) & (np.arange(len(space)) != index)))
         assert sorted(space.neighbours(index)) == near
         assert near
-    pairs = space.neighbour_pairs
-    assert {tuple(sorted(pair)) for pair in pairs.tolist()} == {
-        (i, int(j)) for i in range(len(space)) for j in space.neighbours(i) if i < j
-    }  # fmt: skip
 
 
 def test_a_range_between_two_rings_is_its_middle():

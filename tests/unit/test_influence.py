@@ -8,7 +8,7 @@ import scenes
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from render.phenomena import EFFECTS
-from render.phenomena.base import SAFETY, Influence, Tolerance, largest
+from render.phenomena.base import SAFETY, EffectTolerance, Influence, largest
 from render.phenomena.edges import sides
 from scenes import Floor, InvalidInput, Jitter, Lens, Noise
 from tests.oracle import axes, pinhole
@@ -137,15 +137,15 @@ def test_fixed_pattern_does_not_depend_on_the_noise(sigma, task1):
 
 def test_what_may_be_left_out():
     """At most the tolerance of both; a tolerance is at least 0 and finite; what is no number is not left out."""
-    tolerance = Tolerance(0.01, 0.1)
+    tolerance = EffectTolerance(0.01, 0.1)
     assert not tolerance.exceeded_by(Influence(0.01, 0.1))
     assert tolerance.exceeded_by(Influence(0.0101, 0.0))
     assert tolerance.exceeded_by(Influence(0.0, 0.101))
-    assert Tolerance(0.0, 0.0).exceeded_by(Influence(1e-300, 0.0))
+    assert EffectTolerance(0.0, 0.0).exceeded_by(Influence(1e-300, 0.0))
     for bad in (-1e-9, float("nan"), float("inf")):
         with pytest.raises(InvalidInput, match="tolerance bias_px must be at least 0"):
-            Tolerance(bias_px=bad)
+            EffectTolerance(bias_px=bad)
         with pytest.raises(InvalidInput, match="tolerance variance must be at least 0"):
-            Tolerance(variance=bad)
+            EffectTolerance(variance=bad)
     assert largest(np.array([0.1, 0.3]), np.array([0.2, 0.1])) == (SAFETY * 0.3, SAFETY * 0.2)
     assert largest(np.array([0.1, np.nan]), np.array([np.inf, 0.1])) == (np.inf, np.inf)

@@ -5,7 +5,7 @@ import pytest
 
 from imaging.blurred.boundaries import _SUPPORT, _interpolation
 from imaging.sensor import headroom, recorded
-from planner.search.bound import _DEGREE, _cut_off, _influence, _lagrange, _nodes
+from planner.search.exhaustive import _DEGREE, _cut_off, _influence, _lagrange, _nodes
 
 
 def reproduced(weights, nodes, at, degree, rng):

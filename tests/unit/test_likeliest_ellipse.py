@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from measure.estimators import ellipse
-from measure.estimators.ellipse import LEAST_BLUR, Seen, _near, likeliest_ellipse
+from measure.estimators.ellipse import LEAST_BLUR, Sought, _near, likeliest_ellipse
 from measure.features.blurred_ellipse import ellipse_image, outline, to_symmetric
 from measure.features.optics import Optics
 from scenes import Noise
@@ -13,7 +13,7 @@ from tests.oracle import polygon_image
 SHAPE, BLUR, CONTRAST = (60, 70), 0.8, 60.0
 TRUE = np.array([34.3, 29.6, 17.0, 10.0, 0.4])
 ROUND = np.array([34.3, 29.6, 13.0, 13.0, 0.0])
-ALL = Seen(np.linspace(0, 6, 20), np.ones(20, bool))
+ALL = Sought(np.linspace(0, 6, 20), np.ones(20, bool))
 
 
 def exact(parameters, blur=BLUR):
@@ -76,7 +76,7 @@ def test_nothing_is_found():
 @pytest.mark.parametrize("turn", [0.0, 2 * np.pi, -2 * np.pi])
 def test_only_beside_what_was_seen(turn):
     """The nearest of the places decides, around the circle."""
-    seen = Seen(np.array([0.1, 1.5, 3.0, 6.0]), np.array([True, False, True, False]))
+    seen = Sought(np.array([0.1, 1.5, 3.0, 6.0]), np.array([True, False, True, False]))
     assert seen.near(turn + np.array([0.2, 1.2, 2.9, 5.9, 6.25, 0.9])).tolist() == [
         True,
         False,

@@ -5,11 +5,12 @@ import pytest
 from scipy.optimize import brentq
 
 from imaging.contours import limb
-from imaging.contours.shading import Lamps, Profile, fitted, levels_inside
+from imaging.contours.shading import Profile, fitted
 from imaging.features.limb_locator import limb_crossing
 from imaging.features.locator import edge_blur, kappa2
 from scenes.parts.surfaces import Sphere
 from tests.curved import SURFACES
+from tests.matt import Lamps, levels_inside
 from tests.unit.test_limbs import CAMERA, POSES
 
 LAMPS = Lamps(np.array([[-17.6, 14.8, 19.3], [-4.8, -27.5, 2.4]]), np.array([1.2e5, 0.7e5]))

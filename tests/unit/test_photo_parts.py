@@ -108,7 +108,7 @@ def test_one_corner_that_is_far_off_leaves_all_as_they_were(corner, off, is_take
     """Beyond 12 px along x or y, twice the reach of the profiles, whichever of the four it is."""
     found = CORNERS + 0.3
     found[corner, 1] = CORNERS[corner, 1] + off
-    monkeypatch.setattr(profiles, "intersect", lambda *_: (found, None))
+    monkeypatch.setattr(profiles, "corners_through", lambda *_: (found, None))
     assert refined(picture(), CORNERS).tolist() == (found if is_taken else CORNERS).tolist()
 
 

@@ -163,7 +163,7 @@ def test_sets_and_one_more_picture(rng):
     ok, clutter = rng.uniform(1, 9, (4, 3)), rng.uniform(1, 9, (4, 3))
     ok[:, 1], ok[1, 2], clutter[:3, 1] = 0, 0, 0
     for over, whole in (("minimax", max), ("sum", sum)):
-        table = sets.Information(ok, clutter, over)
+        table = sets.PictureInformation(ok, clutter, over)
         both = table.together([0, 2])
         assert len(both) == 1
         assert both.ok[0] == pytest.approx(ok[0] + ok[2])

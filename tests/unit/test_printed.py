@@ -15,8 +15,8 @@ import measure
 import planner
 import scenes
 from planner.budgeting.budgets import budget
-from planner.search.design import Choice
-from render import Tolerance as LeaveOut
+from planner.design import Choice
+from render import EffectTolerance
 from render.phenomena import Decision, Influence
 from scenes import Pose, Tolerance
 from tests.boards import SMALL, poses, told
@@ -758,7 +758,7 @@ def test_effects_are_printed_by_name():
     ("bias", "variance", "exceeded"), [(0.004, 0.019, False), (0.006, 0.0, True), (0.0, 0.03, True)]
 )
 def test_either_of_two_limits_keeps_an_effect(bias, variance, exceeded):
-    assert LeaveOut(bias_px=0.005, variance=0.02).exceeded_by(Influence(bias, variance)) == exceeded
+    assert EffectTolerance(bias_px=0.005, variance=0.02).exceeded_by(Influence(bias, variance)) == exceeded
 
 
 # --- what is asked on the command line

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import ndtr
 
 from imaging.blurred.kernels import Kernels, Scatter
-from imaging.blurred.quadrature import Nodes, rule
+from imaging.blurred.quadrature import PieceNodes, rule
 
 
 @pytest.mark.parametrize("length", [0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 100.0, 400.0, 2000.0])
@@ -27,7 +27,7 @@ def test_fewer_nodes_are_too_few():
 
 
 def test_nodes_go_piece_after_piece():
-    nodes = Nodes.on(np.array([3.0, 0.0, 200.0]), 0.8)
+    nodes = PieceNodes.on(np.array([3.0, 0.0, 200.0]), 0.8)
     assert (np.diff(nodes.piece) >= 0).all()
     np.testing.assert_allclose(np.bincount(nodes.piece, nodes.weight), 1, rtol=1e-12)
 

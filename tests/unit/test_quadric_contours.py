@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from imaging.contours.quadrics import _polar_plane, _polished, quadric_branches, touching_cone
+from imaging.contours.quadrics import _polar_plane, _polished, quadric_branches
 from scenes.parts.surfaces import Quadric
+from tests.conics import touching_cone
 
 EYE = np.array([3.0, 4.0, 5.0])
 SHEETS = np.diag([1.0, 1.0, -1.0]), np.zeros(3), 2.3  # of two sheets; its asymptotic cone goes through the eye

@@ -10,8 +10,7 @@ import scenes
 from imaging.models.calibrated import calibrated
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
-from planner.search.bound import separable
-from planner.search.exhaustive import exhaustive
+from planner.search.exhaustive import exhaustive, separable
 from planner.search.grid import ViewingSpace
 from planner.search.objective import Aim
 from planner.uncertainty.conformity import decide

@@ -5,8 +5,7 @@ import pytest
 
 import planner
 import scenes
-from planner.search.bound import separable
-from planner.search.exhaustive import _blocks, exhaustive
+from planner.search.exhaustive import _blocks, exhaustive, separable
 from planner.search.grid import ViewingSpace
 from planner.search.local import alternating
 from planner.search.objective import SearchProblem

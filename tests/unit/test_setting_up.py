@@ -11,9 +11,9 @@ import pytest
 import planner
 import scenes
 from imaging.geometry.projection import direction
-from planner.search import setting_up
+from planner.search import candidates
+from planner.search.candidates import SettingUp, how_far
 from planner.search.objective import SearchProblem
-from planner.search.setting_up import SettingUp, how_far
 from scenes import InvalidInput, Pose
 from scenes.status import MEASURED
 from tests.commands import ice
@@ -71,7 +71,7 @@ class Cliff:
 
 def test_what_cannot_be_set_up_is_not_proposed(monkeypatch):
     """The first offer is clear of the cliff by what the pose may be off, and no farther than the first shell."""
-    monkeypatch.setattr(setting_up, "quantity_ranks", lambda errors, _: np.where(errors.polar < 30, 0, 11)[:, None])
+    monkeypatch.setattr(candidates, "quantity_ranks", lambda errors, _: np.where(errors.polar < 30, 0, 11)[:, None])
     sensor, light = np.array([30.001, 40.0]), np.array([20.0, 300.0])
     ways = SettingUp(Cliff(), (False, False))
     assert not ways.is_steady(np.array([30.1, 40.0]), light)
@@ -84,7 +84,7 @@ def test_what_cannot_be_set_up_is_not_proposed(monkeypatch):
 
 def test_a_steep_place_is_a_cliff(monkeypatch):
     """Where 0.2 degrees off the variance is more than four times as large."""
-    monkeypatch.setattr(setting_up, "quantity_ranks", lambda errors, _: np.full((len(errors.polar), 1), 11))
+    monkeypatch.setattr(candidates, "quantity_ranks", lambda errors, _: np.full((len(errors.polar), 1), 11))
     steep, light = Cliff(), np.array([20.0, 300.0])
     for factor, steady in ((70, True), (80, False)):  # 1 + factor * 0.04: 3.8 and 4.2
         steep.values = lambda sensors, lights, factor=factor: 1 + factor * (sensors[:, 0] - 30) ** 2
@@ -98,7 +98,7 @@ def test_a_cliff_is_seen_on_either_side_and_by_any_quantity(side, monkeypatch):
     def ranks(errors, _):
         return np.stack([np.full(len(errors.polar), 11), np.where(side * (errors.polar - 30) < 0, 0, 11)], -1)
 
-    monkeypatch.setattr(setting_up, "quantity_ranks", ranks)
+    monkeypatch.setattr(candidates, "quantity_ranks", ranks)
     ways, light = SettingUp(Cliff(), (False, False)), np.array([20.0, 300.0])
     assert not ways.is_steady(np.array([30 + 0.15 * side, 40.0]), light)
     assert ways.is_steady(np.array([30 + 0.21 * side, 40.0]), light)
@@ -110,7 +110,7 @@ def test_a_picture_of_several_is_steady_for_some_quantities(monkeypatch):
     def ranks(errors, _):
         return np.stack([np.full(len(errors.polar), 11), np.where(errors.polar < 30, 0, 11)], -1)
 
-    monkeypatch.setattr(setting_up, "quantity_ranks", ranks)
+    monkeypatch.setattr(candidates, "quantity_ranks", ranks)
     cliff, light = Cliff(), np.array([20.0, 300.0])
     ways = SettingUp(cliff, (False, False))
     assert ways.steady(np.array([30.15, 40.0]), light).tolist() == [True, False]
@@ -159,7 +159,7 @@ def _apart(poses, here):
 
 def test_poses_are_rounded_in_each_of_their_angles():
     """Azimuths of all lights stay below 360 degrees."""
-    assert setting_up.rounded(np.array([30.04, 359.96, 20.06, 359.97])).tolist() == [30.0, 0.0, 20.1, 0.0]
+    assert candidates.rounded(np.array([30.04, 359.96, 20.06, 359.97])).tolist() == [30.0, 0.0, 20.1, 0.0]
 
 
 @pytest.mark.parametrize("held", [(False, True), (True, False)])

@@ -8,7 +8,7 @@ import pytest
 
 import planner
 import scenes
-from planner.search.constraints import Constraints
+from planner.constraints import Constraints
 from planner.search.grid import ViewingSpace
 from planner.search.lights import Mixture, _Turns, search_shared, shares_of, shares_of_two, with_shares
 from planner.search.objective import Aim, SearchProblem

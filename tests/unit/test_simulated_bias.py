@@ -14,7 +14,7 @@ from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from measure import Correction, Images
 from measure.correction import _with_pooled
-from render import Quality, Tolerance
+from render import EffectTolerance, Quality
 from scenes import Picture, Pose
 from tests.oracle import block_image
 from validation import kept, simulation
@@ -112,7 +112,7 @@ def test_all_that_the_numbers_depend_on_names_the_file(small_task1, picture, tmp
         (picture, method, dataclasses.replace(how, quality=Quality(seed=7))),
         (picture, method, dataclasses.replace(how, effects="physical")),
         (picture, method, dataclasses.replace(how, variant="scalar_rgb_double")),
-        (picture, method, dataclasses.replace(how, tolerance=Tolerance(bias_px=0.5))),
+        (picture, method, dataclasses.replace(how, tolerance=EffectTolerance(bias_px=0.5))),
         *((_on_other_parts(picture, each), method, how) for each in ("vertices", "curved")),
     ]
     named = [kept._digest(*each) for each in [(picture, method, how), *others]]

@@ -18,7 +18,7 @@ import measure
 import planner
 import scenes
 from imaging.contours import contour, limb
-from imaging.features.circles import Rim, calibrated_circle
+from imaging.features.circles import RimImage, calibrated_circle
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import direction, edge_points
 from imaging.light.appearance import edge_contrast, side_signals
@@ -399,7 +399,7 @@ def test_a_circle_s_pieces_have_two_ends_each():
     squared = np.linspace(400, 40_000, n)
     clear = np.ones(n, bool)
     clear[30:50] = clear[150:210] = False
-    rim = Rim(design, arc, squared, 4.0, clear)
+    rim = RimImage(design, arc, squared, 4.0, clear)
     found = calibrated_circle(rim, 0.9, scale, 25.0)
     information, ends = np.zeros((3, 3)), np.zeros((3, 3))
     for i in range(n):
@@ -558,7 +558,7 @@ def test_one_thread_at_a_time_is_in_the_renderer(task1, monkeypatch, door):
     scene = changed(task1, jitter=scenes.Jitter(sensor_deg=0.1))
     case = SimpleNamespace(scene=scene, setting=scene.settings[0])
     monkeypatch.setattr(work, "_jitter", lambda *_: scene.jitter)
-    task = work.Task(case, ((0, 1),), 1, "scalar_rgb")
+    task = work.Chunks(case, ((0, 1),), 1, "scalar_rgb")
     at_once(lambda: work.perform(task))
     assert (alone.most, alone.calls) == (1, 3)
 

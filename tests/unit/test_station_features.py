@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imaging.features.circles import Rim
+from imaging.features.circles import RimImage
 from planner.budgeting.features import _fit
 
 POINTS = 7
@@ -15,7 +15,7 @@ def rim(rng, **parts):
         "design": rng.normal(size=(POINTS, 3)), "arc": rng.uniform(0.5, 2, POINTS),
         "squared": rng.uniform(400, 900, POINTS), "noise_variance": 2.5, "clear": np.ones(POINTS, bool),
     }  # fmt: skip
-    return Rim(**(made | parts))
+    return RimImage(**(made | parts))
 
 
 def test_the_fit_weighs_by_contrast_and_arc(rng):
@@ -31,9 +31,9 @@ def test_points_that_are_not_found_have_no_weight(rng, how):
     """Disturbed ones, and those below five sigma of contrast: 62.5 squared here."""
     seen = rim(rng)
     if how == "disturbed":
-        other = Rim(**{**vars(seen), "clear": np.arange(POINTS) != 4})
+        other = RimImage(**{**vars(seen), "clear": np.arange(POINTS) != 4})
     else:
-        other = Rim(**{**vars(seen), "squared": np.where(np.arange(POINTS) == 4, 62.4, seen.squared)})
+        other = RimImage(**{**vars(seen), "squared": np.where(np.arange(POINTS) == 4, 62.4, seen.squared)})
     fit = _fit(other)
     assert np.flatnonzero(np.abs(fit).max(0) == 0).tolist() == [4]
     kept = np.arange(POINTS) != 4
@@ -50,6 +50,6 @@ def test_a_rim_that_tells_no_circle_is_found_nowhere(rng, how):
         changed["design"][:, 1] = 0
     if how == "two columns alike":
         changed["design"][:, 1] = 3 * changed["design"][:, 0]
-    found = _fit(Rim(**{**vars(seen), **changed}))
+    found = _fit(RimImage(**{**vars(seen), **changed}))
     assert found.shape == (3, POINTS)
     assert np.isnan(found).all()

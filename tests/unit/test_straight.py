@@ -7,12 +7,12 @@ import measure
 from measure.features.calipers import edge_calipers
 from measure.features.layout import polygon_layout
 from measure.features.optics import Optics
-from measure.photo.lens import Lens, _bent, _room, straight_corners
+from measure.photo.lens import Intrinsics, _bent, _room, straight_corners
 from scenes import InvalidInput
 from tests.oracle import polygon_image
 
 SHAPE, NOISE = (100, 120), 2.0
-LENS = Lens(fx=150.0, fy=150.0, cx=60.0, cy=50.0, distortion=(-0.25, 0.08, 0.001, -0.0005))
+LENS = Intrinsics(fx=150.0, fy=150.0, cx=60.0, cy=50.0, distortion=(-0.25, 0.08, 0.001, -0.0005))
 CORNERS = np.array([[30.0, 22.0], [93.0, 30.0], [86.0, 80.0], [24.0, 74.0]])
 OPTICS = Optics(SHAPE, 0.7, NOISE**2)
 
@@ -48,16 +48,16 @@ def test_sides_without_edge_points():
 def test_focal_lengths_have_a_least():
     for bad in (0.0009, 1e-300):
         with pytest.raises(ValueError, match=r"a focal length must be at least 0\.001 px"):
-            Lens(fx=bad, fy=1.0, cx=0.0, cy=0.0)
-    assert Lens(fx=0.001, fy=0.002, cx=1.0, cy=2.0).matrix.tolist() == [[0.001, 0, 1], [0, 0.002, 2], [0, 0, 1]]
-    assert Lens(fx=1.0, fy=1.0, cx=0, cy=0, distortion=(0.1, 0.2)).coefficients.tolist() == [0.1, 0.2, 0, 0, 0]
+            Intrinsics(fx=bad, fy=1.0, cx=0.0, cy=0.0)
+    assert Intrinsics(fx=0.001, fy=0.002, cx=1.0, cy=2.0).matrix.tolist() == [[0.001, 0, 1], [0, 0.002, 2], [0, 0, 1]]
+    assert Intrinsics(fx=1.0, fy=1.0, cx=0, cy=0, distortion=(0.1, 0.2)).coefficients.tolist() == [0.1, 0.2, 0, 0, 0]
 
 
 @pytest.mark.parametrize(
     "lens",
     [
-        Lens(fx=0.13, fy=0.1, cx=51.0, cy=50.5, distortion=(0.0277,)),
-        Lens(fx=159.0, fy=144.0, cx=58.5, cy=49.6, distortion=(20.0, 31.6, -19.2)),
+        Intrinsics(fx=0.13, fy=0.1, cx=51.0, cy=50.5, distortion=(0.0277,)),
+        Intrinsics(fx=159.0, fy=144.0, cx=58.5, cy=49.6, distortion=(20.0, 31.6, -19.2)),
     ],
 )
 def test_a_lens_that_leaves_no_side_in_the_image_is_refused(lens):
@@ -71,14 +71,14 @@ def test_up_to_five_coefficients(count):
     given = tuple(0.01 * (i + 1) for i in range(count))
     if count > 5:
         with pytest.raises(ValueError, match="at most 5 items"):
-            Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=given)
+            Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=given)
         return
-    lens = Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=given)
+    lens = Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=given)
     assert lens.coefficients.tolist() == [*given, *[0.0] * (5 - count)]
     for bad in (1.1e6, -1.1e6, float("nan")):
         with pytest.raises(ValueError, match="distortion"):
-            Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=(bad,))
-    assert Lens(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=(1e6, -1e6)).distortion == (1e6, -1e6)
+            Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=(bad,))
+    assert Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, distortion=(1e6, -1e6)).distortion == (1e6, -1e6)
 
 
 def test_room():

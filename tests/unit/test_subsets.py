@@ -8,7 +8,7 @@ import pytest
 
 from planner.search.candidates import DEAREST
 from planner.search.sets import (
-    Information,
+    PictureInformation,
     _relaxed,
     better,
     every_set,
@@ -19,15 +19,15 @@ from planner.search.sets import (
 )
 
 
-def random_table(seed: int, pictures: int = 14, over: str = "minimax") -> Information:
+def random_table(seed: int, pictures: int = 14, over: str = "minimax") -> PictureInformation:
     """Some quantities are not seen, some are clutter."""
     rng = np.random.default_rng(seed)
     told = rng.uniform(0.1, 1, (pictures, 4)) ** 3 * (rng.uniform(size=(pictures, 4)) < 0.8)
     fine = rng.uniform(size=told.shape) < 0.7
-    return Information(np.where(fine, told, 0.0), np.where(fine, 0.0, told), over)
+    return PictureInformation(np.where(fine, told, 0.0), np.where(fine, 0.0, told), over)
 
 
-def score(table: Information, members) -> tuple[int, float, float]:
+def score(table: PictureInformation, members) -> tuple[int, float, float]:
     return table.of_sets(np.array(members)).at(0)
 
 
@@ -70,7 +70,7 @@ def test_nothing_stays_below_the_bound(over):
     close = []
     for seed in range(10):
         told = np.random.default_rng(seed).uniform(0.1, 1, (12, 4)) ** 3
-        table = Information(told, np.zeros_like(told), over)
+        table = PictureInformation(told, np.zeros_like(told), over)
         bound, best = least_value(table, 3), score(table, every_set(table, 3))[1]
         assert bound <= best * (1 + 1e-9)  # margin: a bound, by its kind
         close.append(best / bound)
@@ -81,13 +81,13 @@ def test_nothing_stays_below_the_bound(over):
 
 
 def test_bound_where_something_is_never_measured():
-    table = Information(np.array([[1.0, 0.0], [2.0, 0.0]]), np.zeros((2, 2)), "minimax")
+    table = PictureInformation(np.array([[1.0, 0.0], [2.0, 0.0]]), np.zeros((2, 2)), "minimax")
     assert least_value(table, 2) == math.inf
     assert score(table, greedy(table, 1)[0])[:2] == (1, 0.5)
 
 
 def test_clutter_counts_only_where_nothing_is_ok():
-    table = Information(np.array([[1.0], [0.0]]), np.array([[0.0], [100.0]]), "minimax")
+    table = PictureInformation(np.array([[1.0], [0.0]]), np.array([[0.0], [100.0]]), "minimax")
     assert score(table, [1])[1] == pytest.approx(DEAREST / 100)
     assert score(table, [0, 1])[1] == 1.0  # the trusted value alone
     assert greedy(table, 2) == ((1,), (1, 1))
@@ -95,7 +95,7 @@ def test_clutter_counts_only_where_nothing_is_ok():
 
 def test_first_of_all_everything_is_measured():
     """A picture that sees both badly is taken before one that sees one of them well."""
-    table = Information(np.array([[100.0, 0.0], [1.0, 1.0]]), np.zeros((2, 2)), "minimax")
+    table = PictureInformation(np.array([[100.0, 0.0], [1.0, 1.0]]), np.zeros((2, 2)), "minimax")
     assert greedy(table, 1) == ((1,),)
     assert greedy(table, 2)[1] == (1, 1)  # the same worst ratio as beside the other one would be twice as large
 

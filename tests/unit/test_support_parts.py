@@ -1,10 +1,12 @@
 """What counts as an edge along an outline, and which patches of a photograph are louder than others of their level."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from measure.find.coarse import Coarse
 from measure.find.support import Steepest, contrast, sign_of, steepest, texture
 from measure.photo.patches import _loud
 
@@ -78,6 +80,7 @@ def test_a_small_shape_among_others_is_texture(beside, area, is_one_of_many):
     gx = np.zeros((60, 60), np.float32)
     gx[:, 34:40] = beside
     coarse = SimpleNamespace(gx=gx, gy=np.zeros_like(gx), across=lambda *given: np.array([[1.0], [-1.0], [1.0]]))
+    coarse.slopes = partial(Coarse.slopes, coarse)
     places = np.array([[30.0, 20.0], [30.0, 30.0], [30.0, 40.0]])
     assert texture(coarse, places, np.tile([1.0, 0.0], (3, 1)), area) == is_one_of_many
 

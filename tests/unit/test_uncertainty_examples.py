@@ -217,9 +217,8 @@ def test_correlated_measurands():
     ampere = np.array([19.663, 19.639, 19.640, 19.685, 19.678]) * 1e-3
     phase = np.array([1.0456, 1.0438, 1.0468, 1.0428, 1.0433])
     readings = np.stack([volt, ampere, phase])
-    group = Group.from_covariance(
-        ("V", "I", "phi"), readings.mean(1), np.cov(readings) / 5, "readings", type="A", dof=4
-    )
+    own = zip(("V", "I", "phi"), readings.mean(1), readings.std(1, ddof=1) / math.sqrt(5), strict=True)
+    group = Group(tuple(Input(*each, type="A", dof=4) for each in own), np.corrcoef(readings), "readings")
     V, I, phi = readings.mean(1)  # noqa: E741
     Z, R, X = V / I, V / I * math.cos(phi), V / I * math.sin(phi)
     slopes = {

@@ -72,7 +72,7 @@ def test_half_widths_are_the_ends():
 
 def test_correlated_normals(rng):
     covariance = np.array([[4.0, -1.8], [-1.8, 1.0]])
-    group = Group.from_covariance(("fx", "cx"), (3500.0, 640.0), covariance, "calibration")
+    group = Group((Input("fx", 3500.0, 2.0), Input("cx", 640.0, 1.0)), ((1, -0.9), (-0.9, 1)), "calibration")
     assert group.covariance == pytest.approx(covariance)
     drawn = group.draw(rng, 40_000)
     found = np.cov(drawn["fx"], drawn["cx"])
@@ -150,16 +150,6 @@ def test_bad_groups(inputs, correlation, message):
         Group(inputs, correlation)
 
 
-def test_bad_covariances():
-    with pytest.raises(InvalidInput, match=r"covariance must be of shape \(2, 2\), got \(3, 3\)"):
-        Group.from_covariance(("a", "b"), (0, 0), np.eye(3))
-    with pytest.raises(InvalidInput, match="covariance must be finite with variances of at least 0"):
-        Group.from_covariance(("a", "b"), (0, 0), -np.eye(2))
+def test_a_group_of_no_freedom():
     with pytest.raises(InvalidInput, match="dof must be at least 1, got 0"):
         Group((A, B), ((1, 0), (0, 1)), dof=0)
-
-
-def test_an_exactly_known_member_of_a_covariance():
-    group = Group.from_covariance(("a", "b"), (1.0, 2.0), np.diag([0.0, 4.0]))
-    assert [each.u for each in group.inputs] == [0.0, 2.0]
-    assert group.covariance == pytest.approx(np.diag([0.0, 4.0]))

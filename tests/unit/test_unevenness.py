@@ -104,7 +104,7 @@ def test_a_print_is_rendered_where_it_is_seen_however_far_from_an_edge(box):
 
     def decision(sensor):
         picture = Picture.of(scene, sensor, LIGHT)
-        (found,) = (each for each in render.choose(scene, "auto", render.Tolerance(), picture).decisions
+        (found,) = (each for each in render.choose(scene, "auto", render.EffectTolerance(), picture).decisions
                     if each.effect.name == "texture")  # fmt: skip
         return found
 

@@ -252,7 +252,9 @@ def test_a_texture_adds_nothing_below_its_surface(light, sensor):
     """Whichever of light and sensor is there."""
     mitsuba = variant.use(variant.SCALAR)
     glossy = Material(specular_fraction=0.3, diffuse_reflectance=0.8, refractive_index=1.6, extinction=0.7)
-    made = mitsuba.load_dict(bsdf.describe(mitsuba, bsdf.Surface(glossy, (Index(1.6, 0.7),), (0.0, 0.0, 100.0), 0.01)))
+    made = mitsuba.load_dict(
+        bsdf.describe(mitsuba, bsdf.Interaction(glossy, (Index(1.6, 0.7),), (0.0, 0.0, 100.0), 0.01))
+    )
     material = SimpleNamespace(brightness=lambda *_: mitsuba.Float(0.25), diffuse=lambda analysed: 0.7)
     made.surface = SimpleNamespace(index=None, material=material)
     wo, wi = mitsuba.Vector3f(0.0, 0.6, light), mitsuba.Vector3f(0.3, 0.0, sensor)

@@ -13,8 +13,8 @@ import scenes
 from measure.boards import approximate
 from measure.estimators import canny
 from measure.features import contrasts
-from planner.search import constraints
-from planner.search.design import Choice
+from planner import constraints
+from planner.design import Choice
 from planner.search.grid import APART
 from planner.search.varying import Place, Variation
 from planner.uncertainty import risks

@@ -10,8 +10,8 @@ import scenes
 from imaging.light.appearance import analyser_axis, of_sides, polarisation_axis, signal
 from imaging.light.irradiance import bands
 from imaging.pictures import Pictures
+from planner.design import Choice, exposure_time, own_choice, throughput, with_choice
 from planner.prediction import variances
-from planner.search.design import Choice, exposure_time, own_choice, throughput, with_choice
 from planner.search.local import Start, descend
 from scenes import Filter, InvalidInput, Lamp
 from validation.vary_check import Scatter, judged

@@ -11,7 +11,7 @@ import trimesh
 
 import planner
 import scenes
-from imaging.features.circles import Rim, calibrated_circle
+from imaging.features.circles import RimImage, calibrated_circle
 from planner.search.local import refine
 from planner.search.objective import SearchProblem
 from render.curved import stands_for
@@ -158,7 +158,7 @@ def test_short_pieces_of_a_rim_have_no_negative_variance(rng):
     design = np.stack([np.cos(angle), np.sin(angle), np.ones(64)], -1)
     lengths = np.geomspace(1e-3, 10, 40)
     clear = rng.random((40, 64)) < 0.6
-    rims = Rim(design, np.broadcast_to(lengths[:, None], (40, 64)), np.ones((40, 64)), 1.0, clear)
+    rims = RimImage(design, np.broadcast_to(lengths[:, None], (40, 64)), np.ones((40, 64)), 1.0, clear)
     found = np.diagonal(calibrated_circle(rims, 0.1, 1.2, 0.0), axis1=-2, axis2=-1)
     assert (found > 0).all()
     assert np.isinf(found[0]).all()

@@ -17,7 +17,7 @@ import measure
 import planner
 import render
 import scenes
-from render import Quality, Tolerance
+from render import EffectTolerance, Quality
 from render import variant as variants
 from scenes import InvalidInput, Scene
 from validation import dimmed, remeasured, simulation
@@ -32,7 +32,7 @@ from validation.batch.result import Validation, collect
 from validation.batch.stages import Stages
 from validation.batch.stopped import Stopped
 from validation.batch.store import RunFile
-from validation.batch.work import CHUNK, Rendering, Task, TaskResult
+from validation.batch.work import CHUNK, Chunks, Rendering, TaskResult
 from validation.code_digest import digest
 from validation.defaults import DEFAULT_SEED
 
@@ -60,7 +60,7 @@ def run(
     quality: Quality = Quality(),
     more: More | None = None,
     effects: str = "auto",
-    tolerance: Tolerance = Tolerance(),
+    tolerance: EffectTolerance = EffectTolerance(),
     photos: Photographs | None = None,
 ) -> Validation:
     """Validate all settings of a scene or a campaign.
@@ -92,7 +92,7 @@ def run(
         or None when it is enough. Its answers are kept, so that a killed run continues with them.
     effects : str
         "auto", "all" or names with commas between: what is simulated (`render.image`).
-    tolerance : Tolerance
+    tolerance : EffectTolerance
         What ``auto`` may leave out.
     photos : Photographs, optional
         Measured instead of renders (`validation.batch.photographs.load`), with the settings that they are of; then
@@ -315,7 +315,9 @@ class _Batch:
                 continue
             files = self.photos.files[index] if self.photos else ()
             how = self.options
-            yield _Setting(Task(case, (), how.seed, self.variant, self.store.packed(index), how.rendering, files), left)
+            yield _Setting(
+                Chunks(case, (), how.seed, self.variant, self.store.packed(index), how.rendering, files), left
+            )
 
     def _group(self, size: int) -> int:
         """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
@@ -326,10 +328,10 @@ class _Batch:
 class _Setting:
     """A setting that has chunks left: its first task renders the image, which then goes with the others."""
 
-    task: Task
+    task: Chunks
     left: deque[tuple[int, int]]
 
-    def next_task(self, group: int) -> Task:
+    def next_task(self, group: int) -> Chunks:
         """Some of the chunks."""
         chunks = tuple(self.left.popleft() for _ in range(min(group, len(self.left))))
         return replace(self.task, chunks=chunks)

@@ -19,14 +19,14 @@ import measure
 import planner
 import render
 from measure import Correction
-from render import Quality, Tolerance
+from render import EffectTolerance, Quality
 from render import variant as variants
 from scenes import InvalidInput, Jitter, Scene
 from scenes.cameras.pinhole import MOST_PIXELS
 from validation import simulation
 from validation.batch import measurands, photographs
 from validation.batch.campaign import Case
-from validation.remeasured import Method, Values, batches, remeasured
+from validation.remeasured import MeasuredValues, Method, batches, remeasured
 
 CHUNK = 250  # images; a run's random numbers depend on it
 _BATCH = 50  # images held in memory at a time, and fewer of more than ...
@@ -127,11 +127,11 @@ class Rendering:
 
     quality: Quality = Quality()
     effects: str = "auto"
-    tolerance: Tolerance = Tolerance()
+    tolerance: EffectTolerance = EffectTolerance()
 
 
 @dataclass(frozen=True)
-class Task:
+class Chunks:
     """Chunks of one setting, (number, images) each; without an image the worker renders it.
 
     With ``photos``, all files of the setting, nothing is rendered: they are measured, and the image is their mean.
@@ -155,7 +155,7 @@ class TaskResult:
     trouble: str | None = None
 
 
-def perform(task: Task) -> TaskResult:
+def perform(task: Chunks) -> TaskResult:
     """Render, unless the image came with the task, then measure.
 
     With one thread of linear algebra, whatever the worker's environment says: a sum split over threads has other bits.
@@ -169,7 +169,7 @@ def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _perform(task: Task) -> TaskResult:
+def _perform(task: Chunks) -> TaskResult:
     if not task.photos:
         with _RENDERER:
             variants.use(task.variant)  # what the machine cannot do is not the setting's fault
@@ -187,7 +187,7 @@ def _perform(task: Task) -> TaskResult:
         return TaskResult(None, {}, str(error))
 
 
-def _shots(task: Task, chunk: int) -> Shots | None:
+def _shots(task: Chunks, chunk: int) -> Shots | None:
     """Takes a chunk's photographs, or pictures from poses set anew each time; None where that does not matter."""
     if task.photos:
         return photographs.exposures(task.case.scene, task.photos[chunk * CHUNK :])
@@ -297,7 +297,7 @@ def _stream(*place: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=tuple(key)))
 
 
-def _columns(scene: Scene, found: tuple[Values, ...]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def _columns(scene: Scene, found: tuple[MeasuredValues, ...]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Values and statuses as of a `Chunk`, by name."""
     names = [method.name for method in methods(scene)]
     values = {name: each.image[:, 0] for name, each in zip(names, found, strict=True)}

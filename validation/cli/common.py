@@ -21,7 +21,7 @@ from validation.report.terminal import console
 from validation.strict_json import dumps
 
 if TYPE_CHECKING:
-    from render import Tolerance
+    from render import EffectTolerance
 
 Report = Callable[[str, int, int], None]
 Given = TypeVar("Given")
@@ -74,12 +74,12 @@ def taking(options: type[Given]) -> Callable[[Callable[[Given], None]], Callable
     return made
 
 
-def tolerance(bias_px: float | None, variance: float | None) -> Tolerance:
+def tolerance(bias_px: float | None, variance: float | None) -> EffectTolerance:
     """What ``auto`` may leave out: its own limits where none are given."""
-    from render import Tolerance
+    from render import EffectTolerance
 
     given = {"bias_px": bias_px, "variance": variance}
-    return Tolerance(**{name: value for name, value in given.items() if value is not None})
+    return EffectTolerance(**{name: value for name, value in given.items() if value is not None})
 
 
 def check_number(option: str, value: float | None, least: float, most: float) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
-from planner.uncertainty.conformity import COVERAGE
 from scenes.status import CLUTTER, is_trusted
 from validation.report import cells
 from validation.strict_json import plain
@@ -126,6 +125,8 @@ def _decision(row: dict[str, Any]) -> str:
         return "-"
     if row["decision"] != "undecided" or is_trusted(row["status"]) or row["value"] is None:
         return row["decision"]
+    from planner.uncertainty.conformity import COVERAGE  # slow to load, and rarely needed
+
     reach = "unknown" if row["u_bias"] is None else f"up to {COVERAGE * row['u_bias']:.1g}"
     return f"undecided (bias {reach})"
 

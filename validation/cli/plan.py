@@ -293,7 +293,7 @@ def _say_unchecked(scene: scenes.Scene, given: Options, count: int) -> None:
 
 def _varied(scene: scenes.Scene, vary: str | None, hold: str | None) -> dict:
     """What is varied beside the poses, checked before anything is searched."""
-    from planner.search.design import DEFAULT_HOLD, check_vary
+    from planner.design import DEFAULT_HOLD, check_vary
 
     if vary is None:
         if hold is not None:

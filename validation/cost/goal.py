@@ -20,7 +20,7 @@ from validation.batch.result import Validation
 from validation.batch.store import RunFile
 from validation.batch.work import methods
 from validation.cost.interval import LEAST, wanted
-from validation.cost.model import Choice, CostModel, combined
+from validation.cost.model import CostModel, Proposal, combined
 from validation.cost.trial import trial
 from validation.remeasured import Sample
 
@@ -41,7 +41,7 @@ class Reached:
     asked, unit : float, str
         "half-width" or "seconds".
     model : CostModel
-    choice : Choice
+    choice : Proposal
     half_widths : tuple of float
         Of each setting's variance ratio, all error sources included; the widest is what was reached.
     images : tuple of int
@@ -53,7 +53,7 @@ class Reached:
     asked: float
     unit: str
     model: CostModel
-    choice: Choice
+    choice: Proposal
     half_widths: tuple[float, ...]
     images: tuple[int, ...]
     seconds: float
@@ -130,13 +130,13 @@ class Goal:
         short = (self.budget or np.inf) <= _SHORT_S or (self.accuracy or 0.0) >= _COARSE
         return trial(campaign, options, 2 if short else 3, _FINE * (self.accuracy or _USUAL))
 
-    def choice(self, model: CostModel) -> Choice:
+    def choice(self, model: CostModel) -> Proposal:
         """Rays and images that reach it."""
         if self.accuracy is not None:
             return model.for_accuracy(self.accuracy)
         return model.for_budget(self.started + self.budget - time.perf_counter())
 
-    def stages(self, campaign: Campaign, model: CostModel, choice: Choice) -> tuple[int, More]:
+    def stages(self, campaign: Campaign, model: CostModel, choice: Proposal) -> tuple[int, More]:
         """The first images of each setting, and what asks for more of them."""
         if self.accuracy is not None:
             return max(LEAST, int(0.8 * choice.renders)), _Narrower(campaign, model, choice, self.accuracy)
@@ -189,7 +189,7 @@ def _begun(options: RunOptions) -> tuple[int, Quality] | None:
         store.close()
 
 
-def _widths(found: Validation, model: CostModel, choice: Choice) -> tuple[tuple[float, ...], tuple[int, ...]]:
+def _widths(found: Validation, model: CostModel, choice: Proposal) -> tuple[tuple[float, ...], tuple[int, ...]]:
     """Half-width of each measured setting's ratio, all sources together, and its images."""
     rows = (row.main for row in found.rows if row.main.ratio is not None)
     each = [(row.ratio * combined(model.errors(choice.rendered, row.n - row.failed)), row.n) for row in rows]
@@ -202,7 +202,7 @@ class _Narrower:
 
     campaign: Campaign
     model: CostModel
-    choice: Choice
+    choice: Proposal
     accuracy: float
 
     def __call__(self, store: RunFile) -> Sequence[int]:
@@ -227,7 +227,7 @@ class _Narrower:
 class _Longer:
     """Asks for the images that fit into the time left, as the images so far have shown."""
 
-    def __init__(self, model: CostModel, choice: Choice, deadline: float) -> None:
+    def __init__(self, model: CostModel, choice: Proposal, deadline: float) -> None:
         self._model, self._choice, self._deadline, self._looks = model, choice, deadline, 0
         self._last = time.perf_counter() + model.start
         self._done = 0

@@ -7,7 +7,7 @@ import time
 import planner
 from planner.search.exhaustive import has_bound
 from scenes import Scene
-from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.parameter import Parameter, Trend, slope
 from validation.cost.watch import Watch
 
 _STEPS = (20.0, 10.0, 5.0, 2.5)
@@ -28,7 +28,7 @@ def grid_parameter(scene: Scene, watch: Watch = Watch()) -> Parameter:
     best = min(planner.plan(scene, step_deg=step, report=told).variance, finest.grid_variance)
     rows = tuple((s, step, seconds, found.grid_variance / best - 1) for s, step, seconds, found in plans)
     points = [(row[1], row[3]) for row in rows if row[0] == "exhaustive" and row[3] > 0]
-    fits = (Fit("exhaustive: gap against step", slope(*zip(*points, strict=True)), 2.0),) if len(points) > 1 else ()
+    fits = (Trend("exhaustive: gap against step", slope(*zip(*points, strict=True)), 2.0),) if len(points) > 1 else ()
     return Parameter(
         name="grid",
         title="Step of the viewing space: optimality gap against the refined optimum",

@@ -80,7 +80,7 @@ class CostModel:
         rest = (accuracy - self.model) ** 2 - (_NORMAL**2) * (rendered.sigma**2 + self.phase**2)
         return math.sqrt(rest)
 
-    def for_accuracy(self, accuracy: float) -> Choice:
+    def for_accuracy(self, accuracy: float) -> Proposal:
         """The cheapest parameters that reach an accuracy.
 
         Raises
@@ -89,7 +89,7 @@ class CostModel:
             If none do: render noise, pixel phase and model alone are larger.
         """
         widths = {rendered: self.sampling_for(rendered, accuracy) for rendered in self.rendered}
-        options = [Choice.of(self, rendered, images(width)) for rendered, width in widths.items() if width > 0]
+        options = [Proposal.of(self, rendered, images(width)) for rendered, width in widths.items() if width > 0]
         if not options:
             least = min(self.total(rendered, 10**8) for rendered in self.rendered)
             raise InvalidInput(
@@ -98,7 +98,7 @@ class CostModel:
             )
         return min(options, key=lambda choice: choice.seconds)
 
-    def for_budget(self, seconds: float) -> Choice:
+    def for_budget(self, seconds: float) -> Proposal:
         """The parameters of least error for a duration, the trial's excluded.
 
         Raises
@@ -111,7 +111,7 @@ class CostModel:
             per_image = self.run_seconds(rendered, 1) - self.run_seconds(rendered, 0)
             n = int((seconds - self.run_seconds(rendered, 0)) / per_image)
             if n >= LEAST:
-                options.append(Choice.of(self, rendered, n))
+                options.append(Proposal.of(self, rendered, n))
         if not options:
             least = self.seconds + min(self.run_seconds(rendered, LEAST) for rendered in self.rendered)
             raise InvalidInput(f"--budget must be at least {least:.0f} s here, got {seconds + self.seconds:.0f} s")
@@ -124,7 +124,7 @@ def combined(errors: dict[str, float]) -> float:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Proposal:
     """Parameters of a run, with what they are expected to give."""
 
     rendered: Rendered
@@ -134,7 +134,7 @@ class Choice:
     seconds: float
 
     @classmethod
-    def of(cls, model: CostModel, rendered: Rendered, n: int) -> Choice:
+    def of(cls, model: CostModel, rendered: Rendered, n: int) -> Proposal:
         errors = model.errors(rendered, n)
         return cls(rendered, n, errors, combined(errors), model.run_seconds(rendered, n))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Fit:
+class Trend:
     """Slope of one column against another, both logarithmic; ``theory`` is None where there is none."""
 
     what: str
@@ -32,7 +32,7 @@ class Parameter:
         Columns to plot against each other.
     series : str
         Column that tells several curves apart; empty if there is one.
-    fits : tuple of Fit
+    fits : tuple of Trend
     note : str
         What explains a slope that is not theory's.
     """
@@ -44,7 +44,7 @@ class Parameter:
     x: str
     y: str
     series: str = ""
-    fits: tuple[Fit, ...] = ()
+    fits: tuple[Trend, ...] = ()
     note: str = ""
 
     def column(self, name: str) -> list:

@@ -12,7 +12,7 @@ from imaging.light.appearance import edge_contrast
 from imaging.pictures import Pictures
 from scenes import InvalidInput
 from validation.batch.campaign import Case
-from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.parameter import Parameter, Trend, slope
 
 _POINTS = (2, 3, 4, 6, 8, 12, 16, 25, 50, 100)
 _EXACT = 64  # Gauss-Legendre nodes
@@ -61,7 +61,7 @@ def points_parameter(case: Case) -> Parameter:
     fits = []
     for name, theory in (("equal weights", -1.0), ("trapezoid", -2.0)):
         points = np.array([row[1:4:2] for row in rows if row[0] == name and row[1] >= 6])
-        fits.append(Fit(f"{name}: error against points", slope(*points.T), theory))
+        fits.append(Trend(f"{name}: error against points", slope(*points.T), theory))
     return Parameter(
         name="points",
         title="Points an edge: error of the predicted variance at an edge's end",

@@ -12,7 +12,7 @@ import measure
 import render
 from validation.batch.campaign import Case
 from validation.cost.model import qualities, rays
-from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.parameter import Parameter, Trend, slope
 from validation.cost.watch import Watch
 
 _SAMPLES = (1, 4, 16, 64)
@@ -31,7 +31,7 @@ def rays_parameter(cases: Sequence[Case], variant: str, watch: Watch = Watch()) 
     fits = []
     for label, theory in (("stratified", -0.75), ("renders averaged", -0.5)):
         points = np.array([row[1:4] for row in rows if row[0] == label], float)
-        fits.append(Fit(f"{label}: corner error against rays", slope(points[:, 0], points[:, 2]), theory))
+        fits.append(Trend(f"{label}: corner error against rays", slope(points[:, 0], points[:, 2]), theory))
     return Parameter(
         name="rays",
         title="Rays a pixel at an edge: error of the noise-free image",

@@ -11,7 +11,7 @@ import render
 from scenes import InvalidInput
 from validation.batch.campaign import Case
 from validation.cost.interval import half_width
-from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.parameter import Parameter, Trend, slope
 from validation.cost.watch import Watch, at_once
 
 _COUNTS = (10, 20, 40, 80, 160, 320)
@@ -53,8 +53,8 @@ def images_parameter(case: Case, image: np.ndarray, seed: int, watch: Watch = Wa
         x="images",
         y="sigma of the variance",
         fits=(
-            Fit("sigma against images - 1", slope(n - 1, found, np.sqrt(groups)), -0.5),
-            Fit("chi-square half-width against images", slope(n[2:], widths[2:]), -0.5),
+            Trend("sigma against images - 1", slope(n - 1, found, np.sqrt(groups)), -0.5),
+            Trend("chi-square half-width against images", slope(n[2:], widths[2:]), -0.5),
         ),
         note="The half-width falls faster than -1/2 with few images, whose chi-square is skewed; fitted from 40 on.",
     )

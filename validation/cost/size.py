@@ -11,7 +11,7 @@ import render
 from scenes import InvalidInput, Scene
 from validation.batch import work
 from validation.batch.campaign import Case
-from validation.cost.parameter import Fit, Parameter, slope
+from validation.cost.parameter import Parameter, Trend, slope
 from validation.cost.watch import Watch
 
 _FACTORS = (0.5, 1.0, 2.0, 4.0)
@@ -38,9 +38,9 @@ def size_parameter(case: Case, variant: str, seed: int, watch: Watch = Watch()) 
         rows.append((scene.camera.width, scene.camera.height, rendered, 1e3 * seconds, relative))
     width, height, rendered, image, error = np.array(rows).T
     fits = (
-        Fit("render against pixels", slope((width * height)[1:], rendered[1:]), 1.0),
-        Fit("noisy image against pixels", slope((width * height)[1:], image[1:]), 0.5),
-        Fit("relative error against width", slope(width[1:], error[1:]), -1.5),
+        Trend("render against pixels", slope((width * height)[1:], rendered[1:]), 1.0),
+        Trend("noisy image against pixels", slope((width * height)[1:], image[1:]), 0.5),
+        Trend("relative error against width", slope(width[1:], error[1:]), -1.5),
     )
     return Parameter(
         name="size",

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.search.constraints import Constraints, same_side
+from planner.constraints import Constraints, same_side
 from planner.search.local import refine
 from planner.search.objective import Aim, SearchProblem
 from scenes import InvalidInput, Pose, Scene

@@ -13,7 +13,7 @@ from scenes.results import finite
 from scenes.status import doubt
 from validation.batch.campaign import Case
 from validation.batch.measurands import column
-from validation.batch.work import Clean, Task, TaskResult, methods
+from validation.batch.work import Chunks, Clean, TaskResult, methods
 from validation.defaults import DEFAULT_SEED
 from validation.explore.state import State
 from validation.remeasured import Sample, batches
@@ -22,15 +22,15 @@ RENDERS = 1000
 CHUNK = 50  # images between two reports, and after which it can be stopped
 
 
-def rendering(scene: Scene, state: State, variant: str) -> Task:
+def rendering(scene: Scene, state: State, variant: str) -> Chunks:
     """The work of rendering the picture, and of propagating its noise."""
-    return Task(_case(scene, state), (), DEFAULT_SEED, variant)
+    return Chunks(_case(scene, state), (), DEFAULT_SEED, variant)
 
 
-def measuring(scene: Scene, state: State, variant: str, clean: Clean, renders: int = RENDERS) -> list[Task]:
+def measuring(scene: Scene, state: State, variant: str, clean: Clean, renders: int = RENDERS) -> list[Chunks]:
     """The work of measuring so many images of it, in pieces."""
     case = _case(scene, state)
-    return [Task(case, ((k, n),), DEFAULT_SEED, variant, clean.image) for k, n in enumerate(batches(renders, CHUNK))]
+    return [Chunks(case, ((k, n),), DEFAULT_SEED, variant, clean.image) for k, n in enumerate(batches(renders, CHUNK))]
 
 
 def _case(scene: Scene, state: State) -> Case:

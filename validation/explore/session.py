@@ -19,7 +19,7 @@ from imaging.light.emitters import reach_of
 from scenes import InvalidInput, Scene
 from scenes.results import picked
 from validation.batch import pool
-from validation.batch.work import Task, TaskResult
+from validation.batch.work import Chunks, TaskResult
 from validation.explore import answers, best, budgets, effects, preview, prove, save, sphere
 from validation.explore.messages import Message
 from validation.explore.state import MOST_VIEWS, State
@@ -206,11 +206,11 @@ class Session:
         rows = [prove.to_message(each) for each in proofs]
         await self._send({"type": "proof", "state": state.to_message(), "rows": rows})
 
-    async def _measured(self, tasks: list[Task]) -> list[TaskResult]:
+    async def _measured(self, tasks: list[Chunks]) -> list[TaskResult]:
         """What the pieces found; a few at a time, so that other visitors' work comes between."""
         few, done = asyncio.Semaphore(pool.cores()), 0
 
-        async def one(task: Task) -> TaskResult:
+        async def one(task: Chunks) -> TaskResult:
             nonlocal done
             async with few:
                 found = await self._tools.perform(task)

@@ -12,7 +12,7 @@ from typing import Any
 
 from render import variant as variants
 from validation.batch import pool
-from validation.batch.work import Task, TaskResult, perform
+from validation.batch.work import Chunks, TaskResult, perform
 
 _WORKERS = 2  # at least two: a pool of one is a thread, which would hold up the answers
 
@@ -62,7 +62,7 @@ class Tools:
         if not begun.cancelled():
             begun.exception()  # nobody may be left to ask for it
 
-    async def perform(self, task: Task) -> TaskResult:
+    async def perform(self, task: Chunks) -> TaskResult:
         """A piece of rendering or measuring."""
         return await self.slowly(perform, task)
 

@@ -9,9 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
-from planner.search.candidates import Candidate
-from planner.search.setting_up import how_far
-from render import Tolerance
+from planner.search.candidates import Candidate, how_far
+from render import EffectTolerance
 from scenes.status import MEANINGS, is_trusted, legend
 from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
 from validation.report.cells import MODELS
@@ -267,8 +266,8 @@ def _gain(best: CheckedSetting, plan: CheckedSetting) -> str:
     change = best.minimised / plan.minimised - 1
     if plan.status != best.status:
         return f"{100 * change:+.1f} % variance, but the plan's picture is {plan.status}"
-    small = f", less than effects that are left out may matter ({100 * Tolerance().variance:g} %)"
-    return f"{100 * change:+.1f} % variance{small if -change < Tolerance().variance else ''}"
+    small = f", less than effects that are left out may matter ({100 * EffectTolerance().variance:g} %)"
+    return f"{100 * change:+.1f} % variance{small if -change < EffectTolerance().variance else ''}"
 
 
 def _robust(safe: planner.Robust) -> Group:

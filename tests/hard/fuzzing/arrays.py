@@ -83,10 +83,6 @@ def _propagate(rng: np.random.Generator, value: Any) -> None:
         raise AssertionError(f"variance {found.variance_px2}, status {found.status}")
 
 
-def _image_bound(_rng: np.random.Generator, value: Any) -> None:
-    measure.image_bound(value, _scene(), (30, 135), (15, 315))
-
-
 def _quadrilateral(_rng: np.random.Generator, value: Any) -> None:
     measure.measure_quadrilateral(value)
 
@@ -118,10 +114,6 @@ def _find_ellipse(rng: np.random.Generator, value: Any) -> None:
         measure.find_ellipse(value, [128, 120, 30, 20, 10], optics)
     else:
         measure.find_ellipse(_clean(), value, optics)
-
-
-def _point_distance(_rng: np.random.Generator, value: Any) -> None:
-    measure.point_distance(value, np.eye(2), np.array([3.0, 4.0]), np.eye(2))
 
 
 def _expose(rng: np.random.Generator, value: Any) -> None:
@@ -159,7 +151,7 @@ def _region(_rng: np.random.Generator, value: Any) -> None:
 
 
 _USES = (
-    _distance, _distance, _distance_poses, _distance_arguments, _propagate, _image_bound, _quadrilateral, _fit_ellipse,
-    _chessboard, _calibrate_camera, _find_ellipse, _point_distance, _expose, _variance, _variances, _predict, _pose,
+    _distance, _distance, _distance_poses, _distance_arguments, _propagate, _quadrilateral, _fit_ellipse,
+    _chessboard, _calibrate_camera, _find_ellipse, _expose, _variance, _variances, _predict, _pose,
     _region,
 )  # fmt: skip

@@ -11,7 +11,7 @@ import scenes
 from imaging.features import rim_look
 from imaging.light import appearance
 from imaging.pictures import Pictures
-from measure import bounds, calibration
+from measure import calibration
 from measure.boards import adjustment, parameters
 from measure.boards.camera import calibrate_camera
 from measure.features.arranged import find_arranged, goodness
@@ -84,15 +84,10 @@ def _bounds():
     scene = load("task1")
     pose = uneven(scene)
     layout = layout_of(Picture.of(scene, *pose))
-    polygon = polygon_layout(_SQUARE, Optics((105, 120), 0.8, 1.7))
     return {
         "bound": [without_error(partial(measure.bound, load(name), *uneven(load(name)))) for name in (
             "task1", "wedge", "plate", "two_lights")],
-        "dark": without_error(lambda: measure.bound(scene, pose[0])), "image": bounds.image_bound(
-            planner.image(scene, *pose), scene, *pose),
-        "empty": bounds.image_bound(np.full((240, 256), 30.0), scene, *pose), "plate": without_error(
-            lambda: bounds.image_bound(np.ones((240, 256)), load("plate"), *uneven(load("plate")))),
-        "corner": bounds.corner_bound(polygon, 90.0, 1.7), "names": layout.names,
+        "dark": without_error(lambda: measure.bound(scene, pose[0])), "names": layout.names,
     }  # fmt: skip
 
 
@@ -176,7 +171,7 @@ def _cameras():
 
 
 def _lenses():
-    one = lens.Lens(fx=420.0, fy=431.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001))
+    one = lens.Intrinsics(fx=420.0, fy=431.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001))
     points = np.array([[[3.0, 7.0], [200.0, 30.0]], [[131.0, 97.0], [77.0, 190.0]]])
     image, corners = rectangle(120, 70, 13), turned(120, 70, 13)
     optics = Optics(image.shape, 0.8, 2.3, 1.1, 5.0)
@@ -188,7 +183,7 @@ def _lenses():
         "straight": one.straighten(points), "bent": one.distort(points), "none": [one.straighten(points[:0]),
         one.distort(
             points[:0])], "matrix": one.matrix, "coefficients": one.coefficients, "corners": ok,
-        "refused": [_words(partial(lens.Lens, **(given | each))) for each in asked], "beside": [without_error(
+        "refused": [_words(partial(lens.Intrinsics, **(given | each))) for each in asked], "beside": [without_error(
             partial(lens.straight_corners, image, polygon_layout(each, optics), one)) for each in beside],
     }  # fmt: skip
 

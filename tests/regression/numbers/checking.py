@@ -13,7 +13,7 @@ import numpy as np
 
 import planner
 import scenes
-from planner.uncertainty import Input, budget, gauge, monte_carlo, uncertainty_ratio, validate
+from planner.uncertainty import Input, budget, gauge, monte_carlo, validate
 from planner.uncertainty.conformity import decide
 from planner.uncertainty.groups import Group
 from render import Quality
@@ -104,7 +104,7 @@ def _capable():
     repeats = 10 + np.array([0.003, -0.001, 0.004, 0.002, -0.0005, 0.0011])
     zone = scenes.Tolerance(plus=0.03, minus=0.01)
     values = (9.985, 9.993, 10.0, 10.021, 10.026, 10.034, 10.05)
-    return {"gauge": gauge(repeats, 10.001, 0.05), "ratio": uncertainty_ratio(0.05, 0.007),
+    return {"gauge": gauge(repeats, 10.001, 0.05),
             "decided": [decide(value, 0.003, 10.0, zone, k) for value in values for k in (1.0, 2.0)]}  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import measure
 import planner
 import scenes
 from imaging.geometry.projection import project
-from measure.features import found, linearity, relations, rim_noise, rims, shape, tools
+from measure.features import found, linearity, rim_noise, rims, shape, tools
 from measure.features.layout import layout_of
 from measure.features.optics import Optics
 from tests.oracle import polygon_image
@@ -100,28 +100,13 @@ def _lens():
     }  # fmt: skip
 
 
-def _between():
-    rng = np.random.default_rng(2)
-    a, b = rng.normal(0, 9, (2, 4, 2))
-    roots = rng.normal(0, 0.1, (2, 4, 2, 2))
-    first, second = roots @ roots.swapaxes(-1, -2)
-    b[3] = a[3]
-    bad = [(a[0, :1], first, b, second), (a, first[:3], b, second), (a, first, b * 1e12, second),
-           (a, first[..., 0], b, second), (a, first * 1e20, b, second), (a[:3], first, b, second)]  # fmt: skip
-    return {"distance": relations.point_distance(a, first, b, second), "one": relations.point_distance(
-                a[0], first, b[0], second[1]),
-            "refused": [without_error(partial(relations.point_distance, *each)) for each in bad]}  # fmt: skip
-
-
 def _gathered():
     scene = load("task1")
     picture = scenes.Picture.of(scene, *uneven(scene))
     layout, clean, rng = layout_of(picture), planner.image(picture), np.random.default_rng(4)
     images = [clean + rng.normal(0, sigma, (2, *clean.shape)) for sigma in (1.3, 2.1)]
     parts = [shape.find_shape(some, layout, by) for some, by in zip(images, ("gradient", "isophote"), strict=True)]
-    return {"gathered": found.gather(parts, np.array([0, 1, 1]), np.array([1, 1, 0])), "nothing": found.nothing(3),
-            "angles": [relations.line_angle(parts[0], i, j) for i, j in ((0, 1), (1, 2), (0, 0))],
-            "tilt": parts[1].tilt_covariance}  # fmt: skip
+    return {"gathered": found.gather(parts, np.array([0, 1, 1]), np.array([1, 1, 0])), "nothing": found.nothing(3)}
 
 
 def _linear():
@@ -138,7 +123,7 @@ def _linear():
 def cases():
     """By name: relative tolerance, and what makes the result."""
     made = {
-        "of rim tools": _tools, "of lenses": _lens, "between points": _between, "gathered": _gathered,
+        "of rim tools": _tools, "of lenses": _lens, "gathered": _gathered,
         "is linear": _linear,
     }  # fmt: skip
     for name in ("plate", "backlight_plate", "ball", "shaft"):

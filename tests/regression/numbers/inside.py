@@ -15,9 +15,10 @@ from measure.estimators import crossing, profile
 from measure.features import conic
 from measure.find import four_sides, rounds
 from measure.photo import rounding
+from planner import design
 from planner.budgeting.plans import systematic
 from planner.budgeting.sources import sources
-from planner.search import design, lights, varying
+from planner.search import lights, varying
 from render import adaptive, optics
 from scenes.parts.surfaces import roots
 from tests.regression.numbers.poses import load, uneven, without_error

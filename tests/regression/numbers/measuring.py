@@ -7,7 +7,6 @@ import numpy as np
 import measure
 import planner
 import scenes
-from measure.bounds import image_bound
 from tests.boards import SMALL, poses
 from tests.photographs import MADE, ellipse, rectangle, tag, turned
 from tests.regression.numbers.poses import CHANGED, load, uneven, without_error
@@ -56,7 +55,7 @@ def _sharpness():
 
 
 def _lens():
-    lens = measure.Lens(fx=420.0, fy=423.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001, 0.0))
+    lens = measure.Intrinsics(fx=420.0, fy=423.0, cx=131.0, cy=97.0, distortion=(-0.11, 0.03, 0.002, -0.001, 0.0))
     return without_error(lambda: measure.measure_quadrilateral(rectangle(120, 70, 13), lens=lens))
 
 
@@ -127,5 +126,4 @@ def cases():
         "sharpness": (SEARCHED, _sharpness), "lens": (SEARCHED, _lens), "noise curve": (SEARCHED, _noise),
         "photograph hole": (SEARCHED, _round_hole),
         "boards": (SEARCHED, _boards), "conics": (CLOSED, _conics), "fit": (SEARCHED, _fitted),
-        "image bound": (CLOSED, lambda: image_bound(_pictures("task1")[0], load("task1"), *uneven(load("task1")))),
     }  # fmt: skip

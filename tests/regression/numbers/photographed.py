@@ -95,8 +95,8 @@ def _not_found():
 def _likeliest():
     optics, free = _optics(), likeliest.free_parameters(False)
     angles = np.linspace(0.3, 6.4, 31)
-    part = likeliest.Seen(angles, np.sin(2 * angles + 0.4) > -0.5)
-    whole = likeliest.Seen(angles, np.ones(31, bool))
+    part = likeliest.Sought(angles, np.sin(2 * angles + 0.4) > -0.5)
+    whole = likeliest.Sought(angles, np.ones(31, bool))
     t = np.linspace(-7, 9, 23)
     start = _SYMMETRIC + [0.3, -0.2, 0.4, -0.3, 0.2]
     linear = likeliest._Linear.at(_shown(), start, 0.8, optics, free, whole)
@@ -149,7 +149,7 @@ def _through_points():
     return {
         "fitted": told, "few": edge_points._fitted(points[:11], np.eye(11) * 0.01, False),
         "line": edge_points._fitted(np.stack([t, 2 * t], 1), np.eye(30), False).status,
-        "distances": edge_points._distances(points, at), "curvature": edge_points._curvature(at, normals),
+        "distances": conic.nearly_away(points, at), "curvature": edge_points._curvature(at, normals),
         "outline": ellipse_outline(at, 7),
     }  # fmt: skip
 
@@ -169,7 +169,7 @@ def _edges():
         "sides": found, "rms": [each.rms for each in found], "short": short, "round": residuals.of_ellipse(image, _AT),
         "blur": [residuals.ellipse_blur(_shown(blur=b), _AT) for b in (0.31, 0.8, 1.7)],
         "dark": residuals.ellipse_blur(-image, _AT),
-        "around": residuals.around(_AT, 5),
+        "around": conic.around(_AT, 5),
     }  # fmt: skip
 
 

@@ -130,7 +130,6 @@ def _risks():
     return {
         "limits": [limits, guarded],
         "probability": [risks.nonconforming_probability(v, 0.021, limits) for v in (12.44, 12.5, 12.61)],
-        "posterior": risks.posterior(12.6, 0.021, 12.52, 0.05),
         "global": [risks.global_risks(12.52, 0.05, 0.021, limits, each) for each in (None, guarded)],
     }  # fmt: skip
 

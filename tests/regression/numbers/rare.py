@@ -16,7 +16,7 @@ from imaging.pictures import Pictures
 from planner.budgeting import plans
 from planner.budgeting.sources import sources
 from planner.search.grid import ViewingSpace
-from planner.uncertainty import Input, budget, conformity, gauge, improve, inputs, risks, uncertainty_ratio
+from planner.uncertainty import Input, budget, conformity, gauge, improve, inputs, risks
 from planner.uncertainty.groups import Group, draw
 from planner.uncertainty.ufloats import as_ufloats
 from scenes import Noise, Picture, Pose, Tolerance
@@ -26,7 +26,6 @@ from tests.regression.numbers.poses import load, uneven, without_error
 from tests.regression.stored import CLOSED, SEARCHED
 from tests.unit.test_limbs import CAMERA, POSES
 
-_LAMPS = shading.Lamps(np.array([[-17.6, 14.8, 19.3], [-4.8, -27.5, 2.4]]), np.array([1.2e5, 0.7e5]))
 _STATION = {
     "sensor_deg": 0.05, "light_deg": {"half_width": 0.7}, "sensor_roll_deg": 0.04, "sensor_distance": 0.02,
     "part_shift": 0.007, "part_tilt_deg": {"half_width": 0.03}, "principal_point_px": 0.6, "rounding": 0.002,
@@ -51,11 +50,9 @@ def _contours(name):
     found = []
     for pose in POSES[:2]:
         seen = limb(surface, pose, CAMERA, 9)
-        inside = np.array([0.05, 0.7, 3.1])
-        levels = [shading.levels_inside(surface, each, pose, CAMERA, inside, _LAMPS) for each in seen.strands]
         known = name in _CLOSED_FORM  # of the others an eigenvector's sign says where they begin
-        found.append({"status": seen.status, "count": len(levels)} | {
-            "strands": seen.strands, "levels": levels} if known else [seen.status, len(levels)])  # fmt: skip
+        found.append({"status": seen.status, "count": len(seen.strands)} | {
+            "strands": seen.strands} if known else [seen.status, len(seen.strands)])  # fmt: skip
     return found
 
 
@@ -63,10 +60,7 @@ def _shading():
     places = np.linspace(0.05, 1, 9)
     levels = np.stack([3 + 2 * places**2, 7 - places + np.sin(3 * places)])
     told = shading.fitted(places, levels, 2.7)
-    surface = SURFACES["sphere"]
-    points = surface.point if hasattr(surface, "point") else surface.centre
-    return {"fitted": told, "levels": told.levels(np.array([0.1, 1.3])), "lambert": shading.lambert(
-        surface, points + np.array([[0.3, 0.2, 1.0], [1.0, -0.4, 0.2]]), _LAMPS)}  # fmt: skip
+    return {"fitted": told, "levels": told.levels(np.array([0.1, 1.3]))}
 
 
 def _tori():
@@ -299,12 +293,9 @@ def _inputs():
             (made["normal"], Input("y", 1.0, 0.1,
             kind="noise" if made["normal"].kind == "systematic" else "systematic")),
             np.eye(2)),
-        lambda: Group.from_covariance(("a", "b"), (1.0,), np.eye(2)),
-        lambda: Group.from_covariance(("a",), (1.0,), np.array([[-1.0]])),
     ]  # fmt: skip
-    joint = Group.from_covariance(
-        ("a", "b", "c"), (1.0, 2.0, 3.0), np.array([[4.0, 1, 0], [1, 9, 0], [0, 0, 0]]), "abc"
-    )
+    some = Input("a", 1.0, 2.0), Input("b", 2.0, 3.0), Input("c", 3.0, 0.0)
+    joint = Group(some, [[1.0, 1 / 6, 0.0], [1 / 6, 1.0, 0.0], [0.0, 0.0, 1.0]], "abc")
     mixed = Group((made["normal"], Input("y", 2.0, 0.5, distribution="rectangular")), [[1.0, 0.6], [0.6, 1.0]])
     rng = np.random.default_rng(4)
     halves = [Input.from_half_width("x", 1.0, 0.2, kind) for kind in ("rectangular", "triangular", "arcsine")]
@@ -356,11 +347,10 @@ def _decisions():
     asked = [
         lambda: gauge(np.array([1.0]), 1.0, 0.05), lambda: gauge(np.array([1.0, np.nan]), 1.0, 0.05),
         lambda: gauge(np.array([1.0, 1.1]), 1.0, 0.0), lambda: gauge(np.array([1.0, 1.0]), 1.0, 0.5),
-        lambda: uncertainty_ratio(0.0, 0.1), lambda: uncertainty_ratio(0.1, -0.1),
         lambda: conformity.decide(1.0, -0.1, 1.0, zones[0], 2.0), lambda: conformity.decide(np.nan, 0.1, 1, zones[0],
         2.0),
         lambda: limits[0].guarded(-0.1, 1.0), lambda: limits[0].guarded(9.0, 1.0),
-        lambda: risks.nonconforming_probability(12.5, -0.1, limits[0]), lambda: risks.posterior(1.0, 0.0, 1.0, 0.1),
+        lambda: risks.nonconforming_probability(12.5, -0.1, limits[0]),
         lambda: risks.global_risks(12.5, 0.0, 0.1, limits[0], None), lambda: risks.Limits(2.0, 1.0),
     ]  # fmt: skip
     return {

@@ -19,7 +19,7 @@ from rich.console import Console
 
 import render
 from measure.photo.photograph import photograph as shapes
-from render import Quality, Tolerance
+from render import EffectTolerance, Quality
 from scenes import InvalidInput
 from scenes.photograph import Photograph
 from tests.boards import Rig
@@ -38,7 +38,7 @@ from validation.batch.options import RunOptions
 from validation.batch.work import Packed, Rendering
 from validation.cli import bar, commands, photograph, recorded
 from validation.cost import effects, goal, size, sweep, table, trial, watch
-from validation.cost.parameter import Fit, Parameter
+from validation.cost.parameter import Parameter, Trend
 from validation.cost.pareto import pareto_parameter
 from validation.cost.scaling import scaling_parameter
 from validation.cost.sweep import Sweep
@@ -184,7 +184,7 @@ def _reached():
         told.append(["run", first, type(more).__name__, options])
         return SimpleNamespace(rows=[])
 
-    say, loose = [], Rendering(tolerance=Tolerance(0.01, 0.1))
+    say, loose = [], Rendering(tolerance=EffectTolerance(0.01, 0.1))
     with mock.patch.object(goal, "trial", tried), mock.patch.object(goal, "run_by", ran), ticking(0.25):
         for aim, options in (
             ({"accuracy": 0.08}, RunOptions()),
@@ -291,7 +291,7 @@ def _checked_effects():
 
 def _sweep():
     """The tables of one, and its order, with parameters that are refused."""
-    fits = (Fit("error against rays", -0.512, -0.5), Fit("time", 1.1, None))
+    fits = (Trend("error against rays", -0.512, -0.5), Trend("time", 1.1, None))
     made = (
         Parameter(
             name="rays",
