@@ -74,10 +74,12 @@ def _drawn(known: Faces, each: Characteristic, datums: dict[str, tuple[int, ...]
         return Drawn(each, faces, reason=found) if isinstance(found, str) else Drawn(each, faces, found)
     if each.value is None:
         return Drawn(each, faces, reason=_NO_VALUE)
+    if each.note in _WITHOUT and each.plus is None:
+        return Drawn(each, faces, reason=_WITHOUT[each.note])
     if not faces:
         return Drawn(each, faces, reason=_NO_FACES)
     if each.plus is None or each.minus is None or not each.plus + each.minus > 0:
-        return Drawn(each, faces, reason=_WITHOUT.get(each.note, _NO_LIMITS))
+        return Drawn(each, faces, reason=_NO_LIMITS)
     candidates = tuple(tuple(some) for some in _features(known, each, unit) if some)
     return Drawn(each, faces, candidates, "" if candidates else _why_not(known, each))
 
@@ -88,11 +90,20 @@ def _features(known: Faces, each: Characteristic, unit: Unit) -> Iterator[list[M
     if each.kind in ("diameter", "radius"):
         yield from _round(known, each, unit, walls)
         return
-    planes = [surface for surface in (*one, *other) if isinstance(surface, Plane)]
+    pairs = _pairs(known, *([surface for surface in some if isinstance(surface, Plane)] for some in (one, other)))
     if each.unit == "deg":
-        yield _angles(known, each, known.different(planes))
+        yield _angles(known, each, pairs)
     elif each.kind in ("linear distance", "thickness", "width"):
-        yield _widths(known, each, unit, known.different(planes))
+        yield _widths(known, each, unit, pairs)
+
+
+def _pairs(known: Faces, one: list[Plane], other: list[Plane]) -> list[tuple[Plane, Plane]]:
+    """Between which two planes a dimension lies: of a size both of its own, of a location one of either feature."""
+    if other:
+        both = product(known.different(one), known.different(other))
+        return [pair for pair in both if len(known.different(list(pair))) > 1]
+    planes = known.different(one)
+    return [(planes[0], planes[1])] if len(planes) == 2 else []
 
 
 def _why_not(known: Faces, each: Characteristic) -> str:
@@ -113,12 +124,19 @@ def _round(known: Faces, each: Characteristic, unit: Unit, walls: list[Cylinder]
         yield [measurand(each, unit, each.kind, centres(rim), rim.name) for rim in rims]
 
 
-def _widths(known: Faces, each: Characteristic, unit: Unit, planes: list[Plane]) -> list[Measurand]:
+def _widths(known: Faces, each: Characteristic, unit: Unit, pairs: list[tuple[Plane, Plane]]) -> list[Measurand]:
     """Between two parallel planes: by two parallel edges in a plane across both, the longest first."""
-    if len(planes) != 2 or np.linalg.norm(np.cross(planes[0].normal, planes[1].normal)) > SAME:
-        return []
-    solid, normal, wanted = known.solid, np.asarray(planes[0].normal), in_unit(each.value, "mm", unit)
     found = []
+    for planes in pairs:
+        if np.linalg.norm(np.cross(planes[0].normal, planes[1].normal)) <= SAME:
+            found += _across(known, in_unit(each.value, "mm", unit), planes)
+    return _by_sides(each, unit, "width", found)
+
+
+def _across(known: Faces, wanted: float, planes: tuple[Plane, Plane]) -> list[tuple[float, Edge, Edge]]:
+    """Pairs of parallel edges, of either plane one, that are as far apart as is wanted; minus the shorter's length
+    first."""
+    solid, normal, found = known.solid, np.asarray(planes[0].normal), []
     for one, other in product(*map(known.edges_in, planes)):
         start, stop = (solid.vertices[edge.ends[0]] for edge in (one, other))
         along = [along_of(solid, Side(edge=edge.name)) for edge in (one, other)]
@@ -128,15 +146,14 @@ def _widths(known: Faces, each: Characteristic, unit: Unit, planes: list[Plane])
         is_parallel = np.linalg.norm(np.cross(*along)) <= SAME
         if is_parallel and is_square and abs(np.linalg.norm(away) - wanted) <= _AS_DRAWN * wanted:
             found.append((-min(solid.length(one), solid.length(other)), one, other))
-    return _by_sides(each, unit, "width", found)
+    return found
 
 
-def _angles(known: Faces, each: Characteristic, planes: list[Plane]) -> list[Measurand]:
+def _angles(known: Faces, each: Characteristic, pairs: list[tuple[Plane, Plane]]) -> list[Measurand]:
     """Between two planes: by two edges of a face that stands across both, the longest first."""
     off, found = _AS_DRAWN * each.value, []
-    pairs = known.across(planes, each.value, off) if len(planes) == 2 else []
     beside = replace(each, value=180 - each.value, plus=each.minus, minus=each.plus)  # of lines the other angle
-    for pair in pairs:
+    for pair in (pair for planes in pairs for pair in known.across(list(planes), each.value, off)):
         told = each if abs(angle_of(known.solid, *pair[1:]) - each.value) <= off else beside
         found.append((pair[0], _by_sides(told, "mm", "angle", [pair])))
     found.sort(key=lambda row: row[0])

@@ -43,6 +43,7 @@ _PREFIXES = {"KILO": 1e3, "HECTO": 1e2, "DECA": 10.0, "DECI": 0.1, "CENTI": 1e-2
              "NANO": 1e-9, None: 1.0}  # fmt: skip
 _TO_UNIT = {"METRE": ("mm", 1000.0), "RADIAN": ("deg", 57.29577951308232)}
 _NOTES = ("theoretical", "auxiliary")
+_FACES, _BOUNDS = ("ADVANCED_FACE", "FACE_SURFACE"), ("FACE_OUTER_BOUND", "FACE_BOUND")
 _DEEPEST = 16  # aspects of aspects
 
 
@@ -81,7 +82,8 @@ class Characteristic:
     unit : str
         ``mm`` or ``deg``.
     faces : tuple of int
-        Numbers of the instances of the faces that it is of; of a location those of its first feature.
+        Numbers of the instances of the faces that it is of; of a location those of its first feature. Of a dimension
+        of edges the faces beside them.
     others : tuple of int
         Of a location those of its second feature.
     """
@@ -172,8 +174,8 @@ class _File:
             is_angle = here.of("ANGULAR_SIZE", "ANGULAR_LOCATION") is not None
             yield Characteristic(
                 number, "angle" if is_angle else name or "dimension", value, plus, minus, fit, note=self._note(number),
-                unit=unit or ("deg" if is_angle else "mm"), faces=self.faces(first),
-                others=self.faces(second) if second is not None else (),
+                unit=unit or ("deg" if is_angle else "mm"), faces=self.faces(first) or self._beside(first),
+                others=(self.faces(second) or self._beside(second)) if second is not None else (),
             )  # fmt: skip
 
     def _measured(self, here: Instance) -> tuple[int | None, int | None, str]:
@@ -217,19 +219,48 @@ class _File:
         return tuple(dict.fromkeys(self._faces(aspect, set(), 0)))
 
     def _faces(self, aspect: int | None, seen: set[int], deep: int) -> Iterator[int]:
+        return (item for item in self._of_aspect(aspect, seen, deep) if self._is_face(item))
+
+    def _beside(self, aspect: int | None) -> tuple[int, ...]:
+        """Numbers of the faces beside the edges that a dimension is of."""
+        edges = [item for item in self._of_aspect(aspect, set(), 0) if not self._is_face(item)]
+        return tuple(dict.fromkeys(face for edge in edges for face in self._faces_at[edge]))
+
+    def _of_aspect(self, aspect: int | None, seen: set[int], deep: int) -> Iterator[int]:
+        """Numbers of the faces and edges of a shape aspect and its parts."""
         if aspect is None or aspect in seen or deep > _DEEPEST:
             return
         seen.add(aspect)
         yield from self._usages[aspect]
         for part in self._parts[aspect]:
-            yield from self._faces(part, seen, deep + 1)
+            yield from self._of_aspect(part, seen, deep + 1)
         here = self.part[aspect]
         if here.of(*_SIZES) is not None:
-            yield from self._faces(self._measured(here)[0], seen, deep + 1)
+            yield from self._of_aspect(self._measured(here)[0], seen, deep + 1)
+
+    @cached_property
+    def _faces_at(self) -> dict[int, list[int]]:
+        """Numbers of the faces on both sides of each edge."""
+        edge_of = {number: self._refers("ORIENTED_EDGE", number, 3) for number in self.part.numbers("ORIENTED_EDGE")}
+        loops = {number: self._refers("EDGE_LOOP", number, 1) for number in self.part.numbers("EDGE_LOOP")}
+        bounds = {number: self._refers(_BOUNDS, number, 1) for number in self.part.numbers(*_BOUNDS)}
+        found: dict[int, list[int]] = defaultdict(list)
+        for face in self.part.numbers(*_FACES):
+            for bound in self._refers(_FACES, face, 1):
+                for edge in (edge for loop in bounds.get(bound, ()) for used in loops.get(loop, ())
+                             for edge in edge_of.get(used, ())):  # fmt: skip
+                    found[edge].append(face)
+        return found
+
+    def _refers(self, kinds: str | tuple[str, ...], number: int, place: int) -> tuple[int, ...]:
+        """The references that stand at one place of an instance's parameters."""
+        told = self.part[number].of(*((kinds,) if isinstance(kinds, str) else kinds)) or ()
+        items = told[place] if len(told) > place else ()
+        return tuple(each for each in (items if isinstance(items, tuple) else (items,)) if isinstance(each, Reference))
 
     @cached_property
     def _usages(self) -> dict[int, list[int]]:
-        """Numbers of faces by shape aspect."""
+        """Numbers of faces and edges by shape aspect."""
         found: dict[int, list[int]] = defaultdict(list)
         kinds = ("GEOMETRIC_ITEM_SPECIFIC_USAGE", "ITEM_IDENTIFIED_REPRESENTATION_USAGE")
         for number in self.part.numbers(*kinds):
@@ -238,11 +269,14 @@ class _File:
             if aspect is not None:
                 items = items.value if isinstance(items, Typed) else items  # SET_REPRESENTATION_ITEM
                 items = items if isinstance(items, tuple) else (items,)
-                found[aspect] += [item for item in items if isinstance(item, Reference) and self._is_face(item)]
+                found[aspect] += [item for item in items if isinstance(item, Reference) and self._is_shown(item)]
         return found
 
     def _is_face(self, number: int) -> bool:
-        return self.part.texts.get(number, "").lstrip().startswith(("ADVANCED_FACE", "FACE_SURFACE"))
+        return self.part.texts.get(number, "").lstrip().startswith(_FACES)
+
+    def _is_shown(self, number: int) -> bool:
+        return self._is_face(number) or self.part.texts.get(number, "").lstrip().startswith("EDGE_CURVE")
 
     @cached_property
     def _parts(self) -> dict[int, list[int]]:

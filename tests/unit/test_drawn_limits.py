@@ -46,7 +46,7 @@ def test_a_drawn_angle_is_measured_as_that_or_as_the_other_one():
     assert angle_of(solid, *edges[1:]) == pytest.approx(120)  # apart: as lines run
     known = SimpleNamespace(solid=solid, across=lambda *_: [(-1.0, *edges[:2])])
     for value, nominal, zone in ((60.0, 60.0, (1.0, 0.25)), (120.0, 60.0, (0.25, 1.0))):
-        (found,) = drawn._angles(known, Characteristic(7, "angle", value, 1.0, 0.25, unit="deg"), [None, None])
+        (found,) = drawn._angles(known, Characteristic(7, "angle", value, 1.0, 0.25, unit="deg"), [(None, None)])
         assert (found.nominal, found.tolerance.plus, found.tolerance.minus) == (nominal, *zone)
 
 

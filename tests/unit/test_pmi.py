@@ -144,6 +144,24 @@ def test_a_flatness_and_an_older_datum_reference():
     assert (upright.kind, upright.datums, upright.faces) == ("perpendicularity", ("A",), (6, 7))
 
 
+def test_a_dimension_between_edges_is_of_the_faces_beside_them():
+    """Edge 70 lies between faces 5 and 6, edge 71 between 6 and 7; a tolerance of an edge is of no face."""
+    text = "#30=DIMENSIONAL_LOCATION('linear distance',$,#40,#41);\n" + _measure(31, 20.0) + _shown(30, 31)
+    text += "#40=SHAPE_ASPECT('',$,#8,.T.);\n#41=SHAPE_ASPECT('',$,#8,.T.);\n"
+    text += "#42=GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#40,#8,#70);\n"
+    text += "#43=GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#41,#8,#71);\n"
+    text += "#44=FLATNESS_TOLERANCE('','',#31,#40);\n"
+    text += "#70=EDGE_CURVE('',#1,#2,#3,.T.);\n#71=EDGE_CURVE('',#1,#2,#3,.T.);\n"
+    for face, edges in ((5, (70,)), (6, (70, 71)), (7, (71,))):
+        used = ",".join(f"#{10 * face + edge}" for edge in edges)
+        text += "".join(f"#{10 * face + edge}=ORIENTED_EDGE('',*,*,#{edge},.T.);\n" for edge in edges)
+        text += f"#{500 + face}=EDGE_LOOP('',({used}));\n#{600 + face}=FACE_OUTER_BOUND('',#{500 + face},.T.);\n"
+        text += f"#{face}=ADVANCED_FACE('',(#{600 + face}),#8,.T.);\n"
+    found, flat = _read(text).characteristics
+    assert (found.faces, found.others) == ((5, 6), (6, 7))
+    assert flat.faces == ()
+
+
 def test_aspects_that_are_each_others_parts_end():
     text = "#60=SHAPE_ASPECT_RELATIONSHIP('','',#20,#22);\n#30=DIMENSIONAL_SIZE(#22,'diameter');\n"
     (found,) = _read(text).characteristics
@@ -242,7 +260,8 @@ def test_dimensions_are_of_the_faces_that_the_file_says():
     for each in sizes:
         surfaces = [part.surfaces[by_place[read.order[number]]] for number in each.faces]
         assert [2 * surface.radius for surface in surfaces] == pytest.approx([each.value] * 2)
-    measurands = [m for each in drawn(part, read, "mm") for some in each.candidates for m in some]
+    every = (each for each in drawn(part, read, "mm") if not each.characteristic.is_tolerance)
+    measurands = [m for each in every for some in each.candidates for m in some]
     scene = scenes.Scene.model_validate({
         "name": "ctc", "units": "mm", "object": {"kind": "step", "file": str(CTC_01)},
         "material": {"diffuse_reflectance": 0.7}, "light": {"distance": 3000.0},
@@ -273,7 +292,7 @@ def test_a_new_scene_asks_for_what_the_file_does(tmp_path):
     assert sorted(named) == sorted(measured)
     assert len(named) >= 5
     for row in rows.values():
-        for name in row["measurands"]:
+        for name in row["measurands"] if row["zone"] is None else ():
             limits = measured[name].tolerance
             one = 1.0 if row["unit"] == "deg" else scale
             assert (limits.plus, limits.minus) == pytest.approx(
