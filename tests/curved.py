@@ -73,3 +73,43 @@ def _changed_quadric(surface: Quadric, name: str, by: float) -> Quadric:
         form[i, j] += by / 2
         form[j, i] += by / 2
     return Quadric(form, linear, constant, surface.hollow)
+
+
+def area_points(surface: Surface, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Points (..., 3) of a surface of finite size, evenly by area as u, v (...) cover the unit square."""
+    of = {Sphere: _on_sphere, Torus: _on_torus}.get(type(surface), _on_ruled)
+    return of(surface, np.asarray(u, float), np.asarray(v, float))
+
+
+def _on_sphere(one: Sphere, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    angle, height = 2 * np.pi * u, 2 * v - 1
+    wide = np.sqrt(np.maximum(1 - height**2, 0.0))
+    return one.centre + one.radius * np.stack([wide * np.cos(angle), wide * np.sin(angle), height], -1)
+
+
+def _on_torus(one: Torus, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Around the tube by Kepler's equation."""
+    wanted, ratio = 2 * np.pi * v, one.tube / one.radius
+    over = wanted.copy()
+    for _ in range(20):
+        over = over - (over + ratio * np.sin(over) - wanted) / (1 + ratio * np.cos(over))
+    across, beside = axes_beside(one.axis)
+    angle = 2 * np.pi * u[..., None]
+    radial = np.cos(angle) * across + np.sin(angle) * beside
+    wide = one.radius + one.tube * np.cos(over)
+    return one.centre + wide[..., None] * radial + (one.tube * np.sin(over))[..., None] * one.axis
+
+
+def _on_ruled(one: Cylinder | Cone, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    low, high = one.ends
+    start = one.radius + one.slope * low
+    along = (high - low) * v
+    if one.slope:
+        end = one.radius + one.slope * high
+        wide = np.sqrt(start**2 + v * (end - start) * (end + start))
+        along = (wide - start) / one.slope
+    across, beside = axes_beside(one.axis)
+    angle = 2 * np.pi * u[..., None]
+    radial = np.cos(angle) * across + np.sin(angle) * beside
+    height = low + along
+    return one.point + height[..., None] * one.axis + (one.radius + one.slope * height)[..., None] * radial

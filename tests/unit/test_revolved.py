@@ -15,6 +15,7 @@ from imaging.light.revolved import light_around, passes, rings_of
 from imaging.pictures import Pictures
 from scenes import Turned
 from scenes.parts.surfaces import axes_beside
+from tests.curved import area_points
 
 STEP = Turned(kind="turned", profile=[(0.0, 6.0), (20.0, 6.0), (20.0, 10.0), (30.0, 10.0)]).solid
 CONES = Turned(kind="turned", profile=[(-9.0, 3.0), (-2.0, 5.0), (-2.0, 6.5), (3.0, 4.0), (8.0, 7.0)]).solid
@@ -71,7 +72,7 @@ def test_shadows_are_those_of_rays(solid):
     rng, rings = np.random.default_rng(2), rings_of(solid)
     curved = [solid.curved[i] for i in rng.integers(len(solid.curved), size=300)]
     u, v = rng.random((2, 300))
-    place = np.array([c.surface.area_points(a, b) for c, a, b in zip(curved, u, v, strict=True)])
+    place = np.array([area_points(c.surface, a, b) for c, a, b in zip(curved, u, v, strict=True)])
     normal = np.array([c.surface.normals(p) for c, p in zip(curved, place, strict=True)])
     way = rng.normal(size=place.shape)
     way *= 200 * np.sign((way * normal).sum(1, keepdims=True)) / np.linalg.norm(way, axis=1, keepdims=True)

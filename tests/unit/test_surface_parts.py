@@ -10,7 +10,7 @@ from scenes.parts.curved import Curved
 from scenes.parts.surfaces import Cone, Cylinder, Plane, Sphere, Torus
 from scenes.parts.surfaces.surface import axes_beside, stretch, unit
 from scenes.parts.walls import _alike, _kinds
-from tests.curved import AXIS, SURFACES
+from tests.curved import AXIS, SURFACES, area_points
 
 EVERY = pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
 
@@ -121,7 +121,7 @@ def test_a_surface_moves_by_the_parameters_that_it_is_found_by(name):
     """To first order its wall moves by its shifts times `parameters`, whichever of them is wrong."""
     surface, step = SURFACES[name], 1e-6
     curved = Curved("c", surface, ())
-    points = surface.area_points(*np.random.default_rng(5).uniform(0.1, 0.9, (2, 20)))
+    points = area_points(surface, *np.random.default_rng(5).uniform(0.1, 0.9, (2, 20)))
     design = surface.shifts(points) @ curved.parameters(EYE)
     assert design.shape == (20, curved.count)
     for k in range(curved.count):

@@ -122,21 +122,6 @@ class Ruled:
         height = (points - self.point) @ self.axis
         return (height >= self.ends[0]) & (height <= self.ends[1])
 
-    def area_points(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Points (..., 3) evenly by area as u, v cover the unit square; for finite ends."""
-        low, high = self.ends
-        start = self.radius + self.slope * low
-        along = (high - low) * np.asarray(v, float)
-        if self.slope:
-            end = self.radius + self.slope * high
-            wide = np.sqrt(start**2 + np.asarray(v) * (end - start) * (end + start))
-            along = (wide - start) / self.slope
-        one, two = axes_beside(self.axis)
-        angle = 2 * np.pi * np.asarray(u, float)[..., None]
-        radial = np.cos(angle) * one + np.sin(angle) * two
-        height = low + along
-        return self.point + height[..., None] * self.axis + (self.radius + self.slope * height)[..., None] * radial
-
 
 def turned(away: np.ndarray, axis: np.ndarray, beside: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Shift along normals where the axis turns towards a unit vector ``beside`` it: that of a rotation."""

@@ -81,9 +81,3 @@ class Sphere:
     def within(self, points: np.ndarray) -> np.ndarray:
         """True: it has no ends."""
         return np.ones(np.shape(points)[:-1], bool)
-
-    def area_points(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Points (..., 3) evenly by area from the unit square."""
-        angle, height = 2 * np.pi * np.asarray(u, float), 2 * np.asarray(v, float) - 1
-        wide = np.sqrt(np.maximum(1 - height**2, 0.0))
-        return self.centre + self.radius * np.stack([wide * np.cos(angle), wide * np.sin(angle), height], -1)

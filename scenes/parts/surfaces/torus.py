@@ -11,8 +11,6 @@ from scenes.parts.surfaces.roots import real_roots
 from scenes.parts.surfaces.ruled import turned
 from scenes.parts.surfaces.surface import axes_beside, checked, length, outwards, point, unit
 
-_KEPLER = 12  # steps of Newton's method
-
 
 @dataclass(frozen=True, eq=False)
 class Torus:
@@ -112,15 +110,3 @@ class Torus:
     def within(self, points: np.ndarray) -> np.ndarray:
         """True: it has no ends."""
         return np.ones(np.shape(points)[:-1], bool)
-
-    def area_points(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Points (..., 3) evenly by area from the unit square; around the tube by Kepler's equation."""
-        wanted, ratio = 2 * np.pi * np.asarray(v, float), self.tube / self.radius
-        over = wanted.copy()
-        for _ in range(_KEPLER):
-            over = over - (over + ratio * np.sin(over) - wanted) / (1 + ratio * np.cos(over))
-        one, two = axes_beside(self.axis)
-        angle = 2 * np.pi * np.asarray(u, float)[..., None]
-        radial = np.cos(angle) * one + np.sin(angle) * two
-        wide = self.radius + self.tube * np.cos(over)
-        return self.centre + wide[..., None] * radial + (self.tube * np.sin(over))[..., None] * self.axis

@@ -37,14 +37,11 @@ def _surface(name):
     points, away = _CENTRE + rng.normal(0, 1.4, (5, 3)), rng.normal(0, 1, (5, 3))
     away /= np.linalg.norm(away, axis=-1, keepdims=True)
     origins = points - 6 * away
-    found = {
+    return {
         "values": surface.values(points), "normals": surface.normals(points), "bend": surface.shape_operator(points),
         "shifts": surface.shifts(points),
         "hits": surface.intersections(origins, away), "within": surface.within(points),
     }  # fmt: skip
-    if hasattr(surface, "area_points"):
-        found["area"] = surface.area_points(rng.random(5), rng.random(5))
-    return found
 
 
 def _solid(name):
