@@ -22,10 +22,10 @@ _CLOSELY = 3, 24  # settings, of which the best is taken: of a large part, of a 
 _TRIANGLES = 5_000  # about so many in all the settings that are looked at
 _ASKED = 8  # measurands that are looked at closely
 _CAPABLE = 1 / 8  # sigma over half the tolerance, below which nothing is gained any more
-_POLAR, _AZIMUTHS = (160, 140, 120, 60, 40, 20), range(10, 370, 45)
+_ABOVE, _BELOW, _AZIMUTHS = (60, 40, 20), (160, 140, 120), range(10, 370, 45)
 _LIGHTS = (1, 1), (-1, -1), (0, 2), (1, -3)  # steps of that grid beside the sensor, turned back at its ends
 _PLACES = 6  # what a measurand is worth is told apart by, or rounding would choose between views that are alike
-_BELOW = 0.5  # what a view from below is worth, for the part lies on something
+_HALF = 0.5  # what a view from below is worth, for the part lies on something
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def first_look(
     """
     looks = int(np.clip(_TRIANGLES // len(scene.solid.triangles), *_CLOSELY))
     report("looking from everywhere", 1, 2 + looks)
-    sensors, lights, worth = _from_everywhere(scene.with_(measurands=candidates))
+    sensors, lights, worth = _from_everywhere(scene.with_(measurands=candidates), most)
     best = None
     for step, number in enumerate(_apart(worth.sum(-1), looks), 2):
         report("looking closely", step, 2 + looks)
@@ -93,11 +93,23 @@ def first_look(
     return best[1]
 
 
-def _from_everywhere(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sensors and lights (N, 2) of a coarse grid, and what every measurand is worth in each picture, (N, M)."""
-    grid = np.array(list(itertools.product(_POLAR, _AZIMUTHS)), float).reshape(len(_POLAR), len(_AZIMUTHS), 2)
+def _from_everywhere(scene: Scene, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sensors and lights (N, 2) of a coarse grid, and what every measurand is worth in each picture, (N, M).
+
+    From below only where from above less is seen than ``most``, and less than could be worth as much from below.
+    """
+    above = _from(scene, _ABOVE)
+    if above[2].sum(-1).max() >= min(most, _HALF * above[2].shape[-1]):
+        return above
+    return tuple(np.concatenate(each) for each in zip(_from(scene, _BELOW), above, strict=True))
+
+
+def _from(scene: Scene, polar: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same for some polar angles; lights turn back at the first and the last."""
+    grid = np.array(list(itertools.product(polar, _AZIMUTHS)), float).reshape(len(polar), len(_AZIMUTHS), 2)
     row, column = np.indices(grid.shape[:2])
-    beside = [(np.where((row + i) // 3 == row // 3, row + i, row - i), column + k) for i, k in _LIGHTS]
+    within = [(row + i >= 0) & (row + i < len(polar)) for i, _ in _LIGHTS]
+    beside = [(np.where(fits, row + i, row - i), column + k) for fits, (i, k) in zip(within, _LIGHTS, strict=True)]
     sensors = grid.reshape(-1, 2)
     lights = np.stack([grid[i, k % len(_AZIMUTHS)].reshape(-1, 2) for i, k in beside], 1)
     pictures = Pictures.of(scene, sensors[:, None], lights)
@@ -106,7 +118,7 @@ def _from_everywhere(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     with np.errstate(divide="ignore", invalid="ignore"):
         worth = np.minimum(_CAPABLE * half / np.sqrt(variances), 1)
     worth = np.stack([np.nan_to_num(worth[..., rows]).min(-1) for rows in _rows(scene.measurands)], -1)
-    worth = worth * np.where(sensors[:, 0] > 90, _BELOW, 1.0)[:, None, None]
+    worth = worth * np.where(sensors[:, 0] > 90, _HALF, 1.0)[:, None, None]
     shape = worth.shape[:-1]
     wide = np.broadcast_to(sensors[:, None], (*shape, 2)).reshape(-1, 2)
     return wide, lights.reshape(-1, 2), worth.reshape(-1, worth.shape[-1]).round(_PLACES)

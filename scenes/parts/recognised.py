@@ -97,21 +97,33 @@ def _fitted(solid: Solid, faces: np.ndarray) -> tuple | None:
 
 def _least_squares(points: np.ndarray, point: np.ndarray, axis: np.ndarray, radius: float):
     """Point of the axis, axis, radius and distances, by two shifts, two tilts and the radius; lengths in radii."""
-    one, two = axes_beside(axis)
+    beside = np.stack(axes_beside(axis))
     away = (points - point) / radius
     size = max(float(np.abs(away @ axis).max()), 1.0)
 
     def line(numbers):
-        turned = axis + (numbers[2] * one + numbers[3] * two) / size
-        return numbers[0] * one + numbers[1] * two, turned / np.linalg.norm(turned)
+        turned = axis + numbers[2:4] @ beside / size
+        return numbers[:2] @ beside, turned / np.linalg.norm(turned)
+
+    def across(numbers):
+        start, way = line(numbers)
+        along = (away - start) @ way
+        beyond = away - start - along[:, None] * way
+        return along, beyond, np.linalg.norm(beyond, axis=1)
 
     def distances(numbers):
-        start, way = line(numbers)
-        return np.linalg.norm(np.cross(away - start, way), axis=1) - numbers[4]
+        return across(numbers)[2] - numbers[4]
+
+    def slopes(numbers):
+        along, beyond, far = across(numbers)
+        out = beyond @ beside.T / far[:, None]
+        tilts = -along[:, None] * out / (size * np.linalg.norm(axis + numbers[2:4] @ beside / size))
+        return np.column_stack([-out, tilts, -np.ones(len(away))])
 
     from scipy.optimize import least_squares  # slow to load, and rarely needed
 
-    done = least_squares(distances, [0.0, 0.0, 0.0, 0.0, 1.0], method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    begin = [0.0, 0.0, 0.0, 0.0, 1.0]
+    done = least_squares(distances, begin, slopes, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     start, way = line(done.x)
     way = way * np.sign(way[np.abs(way).argmax()])
     return point + radius * start, way, float(radius * done.x[4]), radius * distances(done.x)

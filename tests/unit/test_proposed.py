@@ -146,7 +146,8 @@ class _Forecast:
 def test_a_first_look_is_worth_what_is_predicted_there():
     """Half the zone over eight sigma, at most 1, and half of that from below: 192 pictures, as one by one."""
     scene = scenes.load("calibrated_rig").with_(**{"measurands[0].tolerance": {"plus": 0.02, "minus": 0.0}})
-    sensors, lights, worth = first_look._from_everywhere(scene)
+    both = [first_look._from(scene, polar) for polar in (first_look._BELOW, first_look._ABOVE)]
+    sensors, lights, worth = map(np.concatenate, zip(*both, strict=True))
     assert len(sensors) == len(lights) == len(worth) == 192
     seen = np.flatnonzero(worth[:, 0])
     assert (worth[seen] < 1).any()
@@ -155,6 +156,21 @@ def test_a_first_look_is_worth_what_is_predicted_there():
         told = planner.predict(scene, Pose.of(sensors[i]), Pose.of(lights[i])).measurands[0]
         expected = min(0.01 / 8 / told.variance_object**0.5, 1) * (0.5 if sensors[i, 0] > 90 else 1)
         assert worth[i, 0] == pytest.approx(expected, abs=1e-6)  # margin: rounded to six places
+
+
+@pytest.mark.parametrize(("shown", "most", "count"), [(6, 6, 96), (6, 7, 192), (8, 20, 96), (7, 20, 192)])
+def test_from_below_is_looked_only_where_more_could_be_seen_there(monkeypatch, shown, most, count):
+    """16 measurands: what is seen from below is worth half, so 8 from above are not exceeded."""
+
+    def seen(scene, polar):
+        worth = np.zeros((96, 16))
+        worth[:, :shown] = 1.0
+        return np.full((96, 2), polar[0]), np.zeros((96, 2)), worth
+
+    monkeypatch.setattr(first_look, "_from", seen)
+    sensors, _, worth = first_look._from_everywhere(None, most)
+    assert len(sensors) == len(worth) == count
+    assert set(sensors[:, 0]) == ({60} if count == 96 else {60, 160})
 
 
 def test_of_each_sensor_the_best_light_is_looked_at_closely():
