@@ -5,9 +5,9 @@ the render itself, less its direct light (`validation.dimmed`); else each is ren
 and subtracted from the same render of the scene as it is. Lights that stand elsewhere are rendered so, too, in large
 images their direct light alone; of plain scenes the closed form of the bias tells what lights do. Two renders that are
 compared have the same rays, one by one, or their difference would be noise; and what makes a picture brighter or darker
-as a whole, which moves nothing, is not told by few rays but by the render itself. All of them are made where something is
-measured (everywhere for estimators that look farther), and with few rays first: where the noise of these is far below
-sigma or the tolerance, more rays would tell nothing.
+as a whole, which moves nothing, is not told by few rays but by the render itself. All of them are made where something
+is measured (everywhere for estimators that look farther), and with few rays first: where the noise of these is far
+below sigma or the tolerance, more rays would tell nothing.
 """
 
 from __future__ import annotations
