@@ -236,6 +236,7 @@ class _Tracer:
             self.quality.everywhere,
             self.bounced if apart and between else None,
             (lambda marked: lent_to(picture, marked, self.start, k)) if between and plane else None,
+            self.quality.alike,
         )
         rays = self.ordinary, self.few, self.many
         return fine_pixels(picture, self.crop, renders, math.ceil(k * defocus(picture)), rays)

@@ -48,6 +48,9 @@ class Renders:
         where that alone is random and is to be added to the direct light.
     lent_to : callable, optional
         Mask of fine pixels to those of them that what is random may be seen in; all, if not given.
+    alike : bool
+        Whether pixels get the same rays wherever an edge crosses them, so that those of two images from one place are
+        the same one by one: where they are random, rays go by their order.
     """
 
     whole: Callable[[bool, int], np.ndarray]
@@ -57,6 +60,7 @@ class Renders:
     everywhere: bool = True
     bounced: Callable[[np.ndarray, int], np.ndarray] | None = None
     lent_to: Callable[[np.ndarray], np.ndarray] | None = None
+    alike: bool = False
 
 
 def whole_pixels(crop: tuple[slice, slice], supersample: int) -> tuple[slice, slice]:
@@ -110,6 +114,8 @@ def fine_pixels(
     fine = renders.again(False, fine, divided, ordinary)
     marked, near = crossed(fine, reach, where=asked) & divided, _fine(near, k)
     lent = near if renders.lent_to is None or not renders.random else renders.lent_to(near)
+    if renders.random and renders.alike and not renders.everywhere:
+        return renders.again(True, fine, near & lent, max(few, many))
     if renders.random:
         fine = _fine(renders.whole(True, few), k) if renders.everywhere else fine
         even, moving = near & ~marked, True

@@ -22,10 +22,13 @@ if TYPE_CHECKING:
 def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray | float:
     """Signal that points (..., 3) on faces (...) of the bodies have from other faces, and from the floor.
 
-    Diffuse light alone; 0 where there are turned parts, and in pictures that are not looked at closely.
+    Diffuse light alone; 0 on round walls that are measured as such, whose limbs have a model of their own, and in
+    pictures that are not looked at closely.
     """
     scene = pictures.scene
-    if not pictures.closely or not is_exchanged(scene) or scene.solid.curved or not points.size:
+    round_walls = [face for each in scene.solid.curved for face in each.faces]
+    asked = ~np.isin(faces, round_walls)
+    if not pictures.closely or not is_exchanged(scene) or not points.size or not asked.any():
         return 0.0
     shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
@@ -38,7 +41,7 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
             found[inside] = _of_wall(scene, shining, bore, pictures.roughly).ev(*place_in(bore, points[inside]))
     analysed = scene.camera.analyser_deg is not None
     white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
-    return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * found
+    return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * np.where(asked, found, 0.0)
 
 
 def light_of_dimmed(

@@ -1,16 +1,19 @@
 """Where light from other surfaces may be seen, and how much of it is left where all reflect less."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import scenes
 from imaging.geometry.looked_at import looked_at
 from imaging.geometry.projection import facing, project_ideal, sensor_position
-from imaging.light.between import light_of_dimmed
+from imaging.light.between import light_between, light_of_dimmed
 from imaging.pictures import Pictures
 from render.between import lent_to
-from scenes import Picture
+from scenes import Picture, Scene
 from tests.parts import newcomers
+from tests.step_parts import flange, written
 from validation.dimmed import of_one_surface
 
 
@@ -119,3 +122,36 @@ def test_other_scenes_are_rendered(picture):
     floor = picture.with_scene(scene.with_(floor={"reflectance": 0.3, "height": -1.0}))
     assert of_one_surface(floor, (rendered,), lambda: rendered, 0.1) is None
     assert of_one_surface(picture, (rendered,), lambda: rendered, 0.0) is None
+
+
+def test_a_limb_that_is_measured_leaves_light_between_other_faces_as_it_is(tmp_path):
+    """Of a flange: walls of its holes have light from themselves.
+
+    Facets of the round wall whose limb is measured have a model of their own, and none here.
+    """
+    file = written(flange(), tmp_path / "flange.step")
+    told = {"name": "d", "kind": "diameter", "tolerance": 0.05}
+    plain = scenes.load("bracket_mm").model_dump(exclude={"measurands", "settings"})
+    plain |= {"object": {"kind": "step", "file": str(file)}}
+    bare = Scene.model_validate(plain | {"measurands": [told | {"features": [{"circle": "c1"}]}]})
+    walls = [each.name for each in bare.all_walls.curved]
+    found = []
+    for scene in (bare, *(_limb_measured(plain, told, name) for name in walls)):
+        solid, pictures = scene.solid, replace(Pictures.of(scene, (20, 30), (30, 200)), closely=True)
+        faces = np.arange(len(solid.faces))
+        middles = np.array([solid.triangles[solid.triangle_faces == face].mean((0, 1)) for face in faces])
+        own = [face for each in solid.curved for face in each.faces]
+        found.append((light_between(pictures, middles, faces), own))
+    assert walls
+    (before, none), *others = found
+    assert not none
+    assert (before > 0).mean() > 0.1
+    for after, own in others:
+        assert own
+        rest = np.setdiff1d(np.arange(len(before)), own)
+        assert (after[own] == 0).all()
+        assert after[rest] == pytest.approx(before[rest], rel=1e-9, abs=1e-9)
+
+
+def _limb_measured(plain, told, name):
+    return Scene.model_validate(plain | {"measurands": [told | {"features": [{"surface": name}]}]})

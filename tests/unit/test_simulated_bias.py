@@ -392,23 +392,35 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
 def test_direct_light_is_rendered_once_for_all_that_compare_with_it(monkeypatch, small):
     """What surfaces send to each other, and each of three steps of the light's place: four images, none twice.
 
-    Of a small image direct light is rendered once more, with rays that tell it better.
+    Of a small image lights are moved in renders of all light, and direct light is rendered with rays that tell it
+    better.
     """
     scene, asked, fine = scenes.load("bracket"), [], []
 
     def rendered(how, shown, effects, seed):
-        asked.append((shown, how.quality.alike, "interreflection" in effects))
+        asked.append((shown, how.quality.alike, effects == "auto" or "interreflection" in effects))
         fine.append(how.quality.edge_samples == 256)
-        return np.full((2, 2), float(len(asked)))
+        return np.full((2, 2), 50.0 + len(asked))
 
     monkeypatch.setattr(How, "_rendered", rendered)
     monkeypatch.setattr(simulation, "of_one_surface", lambda picture, renders, direct, part: renders[0] - direct())
     monkeypatch.setattr(simulation, "LARGE_RANDOM", 1 << 20 if small else 1)
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
-    images = simulation._completed(picture, (np.full((2, 2), 7.0),), (), How())
-    assert [each[1:] for each in asked] == [(True, False)] * (4 + small)
+    images = simulation._completed(picture, (np.full((2, 2), 77.0),), (), How())
+    assert [each[1:] for each in asked] == [(True, False)] + [(True, small)] * (3 + small)
     assert [shown is picture for shown, *_ in asked].count(True) == 1 + small
     assert len({shown for shown, *_ in asked}) == 4
     assert fine == [small] + [False] * (3 + small)
-    assert [each.flat[0] for each in images.changed["reflectance"]] == [7 - 1]
-    assert [each.flat[0] for each in images.changed["light_place"]] == [7 + k - (5 if small else 1) for k in (2, 3, 4)]
+    assert [each.flat[0] for each in images.changed["reflectance"]] == [77 - 51]
+    dark, here = scene.noise.dark_level, 55 if small else 51
+    expected = [dark + (77 - dark) * (50 + k - dark) / (here - dark) for k in (2, 3, 4)]
+    assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(expected, rel=1e-12)
+
+
+def test_what_few_rays_tell_of_all_levels_moves_no_edge():
+    """An edge that few rays show aside: of a picture that is a tenth darker the image is, too; a spot of 5 is one."""
+    first, here = np.array([[100.0, 100.0, 20.0, 20.0]]), np.array([[100.0, 70.0, 20.0, 20.0]])
+    assert simulation._changed(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
+    with_spot = first + np.array([[0.0, 0.0, 0.0, 5.0]])
+    assert simulation._changed(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
+    assert simulation._changed(first, 0 * here, 0 * here).tolist() == [[0.0] * 4]
