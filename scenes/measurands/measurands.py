@@ -135,7 +135,7 @@ class Measurand(Model):
     nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Coordinate, Coordinate] | None = None
     """The value that is wanted, the scene's unit or degrees; two for a place; the object's own if left out."""
     tolerance: Annotated[Tolerance | None, BeforeValidator(_both_ways)] = None
-    """How far it may lie from it, the scene's unit or degrees: one number, or plus and minus; a zone's width or diameter."""
+    """How far it may lie from it, the scene's unit or degrees: one number, or plus and minus; a zone's size."""
     weight: Positive = 1.0
     """In the planner's weighted sum."""
 

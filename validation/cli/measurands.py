@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def covariance(found: measure.Measurements) -> list[list[float | None]]:
     return plain(found.covariance)
 
 
-def table(rows: list[dict[str, Any]], zones: list[dict[str, Any]] = ()) -> Table:
+def table(rows: list[dict[str, Any]], zones: Sequence[dict[str, Any]] = ()) -> Table:
     """The same for a terminal, each zone in a row below its numbers."""
     columns = (
         "name", "kind", "value", "u", "unit", "bias off", "u(bias)", "nominal", "tolerance", "decision", "status",
