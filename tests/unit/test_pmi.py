@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import scenes
+from imaging.features.measurand import measurands
+from imaging.pictures import Pictures
 from scenes.measurands.drawn import drawn
 from scenes.parts import pmi, step
 from validation.new_scene import written
@@ -260,21 +262,26 @@ def test_dimensions_are_of_the_faces_that_the_file_says():
     for each in sizes:
         surfaces = [part.surfaces[by_place[read.order[number]]] for number in each.faces]
         assert [2 * surface.radius for surface in surfaces] == pytest.approx([each.value] * 2)
-    every = (each for each in drawn(part, read, "mm") if not each.characteristic.is_tolerance)
-    measurands = [m for each in every for some in each.candidates for m in some]
+    asked = [m for each in drawn(part, read, "mm") for some in each.candidates for m in some]
     scene = scenes.Scene.model_validate({
         "name": "ctc", "units": "mm", "object": {"kind": "step", "file": str(CTC_01)},
         "material": {"diffuse_reflectance": 0.7}, "light": {"distance": 3000.0},
         "camera": {"width": 640, "height": 480, "focal_px": 2000.0, "distance": 3000.0, "look_at": [-400, 200, 0],
                    "blur_px": 0.8, "exposure": 180.0},
         "noise": {"dark_level": 16.0, "sigma": 1.5, "bits": 8},
-        "measurands": [each.model_dump(exclude_none=True) for each in measurands],
+        "measurands": [each.model_dump(exclude_none=True) for each in asked],
     })  # fmt: skip
     radii = {circle.name: circle.radius for circle in scene.solid.circles}
     values = {each.number: each.value for each in read.characteristics}
-    assert len(measurands) >= 12
-    assert {measurand.kind for measurand in measurands} == {"angle", "diameter"}
-    for measurand in measurands:
+    assert len(asked) >= 14
+    assert {measurand.kind for measurand in asked} == {"angle", "diameter", "width"}
+    places = [measurand for measurand in asked if measurand.kind == "width"]
+    assert [measurand.name.split()[:2] for measurand in places] == [["position", "#21"], ["position", "#22"]]
+    assert [measurand.tolerance.plus for measurand in places] == [0.375, 0.375]  # half of the zones' width
+    known = measurands(Pictures.of(scene, np.array([20.0, 30.0])))
+    told = dict(zip((quantity.name for quantity in known.quantities), known.value_object, strict=True))
+    assert [told[measurand.name] for measurand in places] == pytest.approx([175.0, 175.0])  # both from bore B
+    for measurand in asked:
         value = values[int(measurand.name.split("#")[1].split()[0])]
         if measurand.kind == "diameter":
             assert 2 * radii[measurand.features[0].circle] == pytest.approx(value)

@@ -1,0 +1,125 @@
+"""Geometric tolerances and features between others: rendered, measured, decided, planned, budgeted, validated."""
+
+import json
+
+import numpy as np
+import pytest
+
+import scenes
+from scenes.files.written import edited
+from tests import toleranced
+from tests.commands import ice
+from tests.proofs import kinds
+
+pytestmark = pytest.mark.render
+NAMES = ("in edges", "slot to plate", "right", "bolts", "slot")
+POSES = ("--sensor", "20,300", "--light", "30,350")
+_TINY = {"width": 240, "height": 192, "focal_px": 900.0}
+_SMALL = {"width": 480, "height": 384, "focal_px": 1800.0}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The plate's scene as a file, another whose true place is off by 0.09 mm in x and y, and a picture."""
+    made = tmp_path_factory.mktemp("toleranced")
+    scene = toleranced.scene(made, NAMES, **_TINY)
+    data = scene.model_dump(mode="json", exclude_defaults=True, exclude={"name"})
+    data["object"]["file"] = "toleranced.ply"
+    data["settings"] = [{"sensor": [20, 300], "light": [30, 350]}]
+    (made / "plate.toml").write_text(edited("", data))
+    data["measurands"] = [
+        each | ({"nominal": [30.09, 32.09]} if each["name"] == "in edges" else {}) for each in data["measurands"]
+    ]
+    (made / "off.toml").write_text(edited("", data))
+    done = ice("render", "plate.toml", *POSES, "-o", "plate.png", "--noise-seed", 3, cwd=made)
+    assert done.returncode == 0, done.stderr
+    return made
+
+
+def _measured(folder, scene):
+    done = ice("measure", "plate.png", scene, *POSES, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def _parts(told):
+    """Of the zone's two numbers."""
+    return [each for each in told["measurands"] if each["kind"] == "true_position"]
+
+
+def test_measured_values_are_the_plates(folder):
+    """Within 5 combined standard uncertainties; single numbers are decided, those of a zone with it."""
+    told = _measured(folder, "plate.toml")
+    for each in told["measurands"]:
+        true = toleranced.VALUES[each["name"]]
+        assert abs(each["value"] - true) < 5 * each["u"], each["name"]  # margin: 5 standard uncertainties
+        assert each["status"] == "ok"
+    decisions = {each["name"]: each["decision"] for each in told["measurands"]}
+    assert (decisions["in edges.x"], decisions["in edges.y"], decisions["right"]) == (None, None, "pass")
+    assert decisions["slot to plate"] == "fail"  # the slot is 2 mm off the plate's middle, and is drawn in it
+    (zone,) = told["zones"]
+    assert (zone["name"], zone["parts"], zone["size"]) == ("in edges", ["in edges.x", "in edges.y"], 0.2)
+    assert (zone["decision"], zone["status"]) == ("pass", "ok")
+    x, y = (each["value"] - each["nominal"] for each in _parts(told))
+    assert zone["value"] == pytest.approx(2 * np.hypot(x, y))
+    assert zone["low"] < zone["at_most"] < zone["high"] < 0.2
+
+
+def test_two_components_within_their_limits_leave_the_zone(folder):
+    """Each is off by 0.09 of 0.1 mm; the circle's diameter is 0.25 of 0.2."""
+    told = _measured(folder, "off.toml")
+    for each in _parts(told):
+        assert abs(each["value"] - each["nominal"]) + 2 * each["u"] < each["tolerance"]["plus"]
+    (zone,) = told["zones"]
+    assert zone["value"] == pytest.approx(2 * np.hypot(0.09, 0.09), abs=5 * zone["u"])
+    assert zone["decision"] == "fail"
+    table = ice("measure", "plate.png", "off.toml", *POSES, cwd=folder).stdout
+    row = next(line for line in table.splitlines() if line.strip().startswith("in edges ") and "true_position" in line)
+    assert "fail" in row
+    assert "<=" in row
+
+
+def test_planned_and_budgeted(folder):
+    """By tolerance, the worst number of all named; no risk is said of a number that a zone decides."""
+    done = ice("plan", "plate.toml", "--step", 45, "--no-check", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    plan = json.loads(done.stdout)
+    scene = scenes.load(folder / "plate.toml")
+    limits = {quantity.name: quantity.tolerance.half for quantity in scene.quantities}
+    assert limits["in edges.x"] == 0.1  # half of the zone's diameter
+    assert {each["name"] for each in plan["measurands"]} == set(limits)
+    assert plan["limiting"] in limits
+    done = ice("budget", "plate.toml", "--sensor", "20,300", "--light", "30,350", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    rows = {each["name"]: each for each in json.loads(done.stdout)["measurands"]}
+    assert set(rows) == set(limits)
+    assert rows["in edges.x"]["capability"]["specific_risk"] is None
+    assert rows["right"]["capability"]["specific_risk"] is not None
+
+
+def test_shown_and_validated(folder):
+    """`ice show` names what lies between; a run judges each number, its page names all."""
+    shown = ice("show", "plate.toml", cwd=folder).stdout
+    assert "centre line of e10 and e12" in " ".join(shown.split())
+    done = ice("validate", "plate.toml", "--renders", 60, "--workers", 1, "--out", "run", cwd=folder)
+    assert done.returncode in (0, 1), done.stderr
+    page = (folder / "run/report.html").read_text()
+    result = json.loads((folder / "run/result.json").read_text())
+    names = [each["name"] for each in result["settings"][0]["measurands"]]
+    assert names == [name for name in toleranced.VALUES if name in names]
+    assert len(names) == 7
+    assert all(name in page for name in names)
+
+
+def test_all_kinds_scatter_as_propagated(tmp_path):
+    """One of the proof's pictures: variances inside the Sidak 1 %, means at the plate's; a wrong one is refused."""
+    rng = np.random.default_rng(2)
+    scene = toleranced.scene(tmp_path, **_SMALL)
+    picture = kinds.pictures(scene, 1, rng)[0]
+    rows, zones = kinds.rows(picture, 120, rng, seed=1000)
+    assert sum(row.counts for row in rows) == len(rows) == len(toleranced.VALUES)
+    assert all(row.holds(len(rows)) for row in rows), [str(row) for row in rows if not row.holds(len(rows))]
+    assert all(row.is_true for row in rows), [str(row) for row in rows if not row.is_true]
+    assert not any(row.holds(len(rows), 3.0) for row in rows)  # negative control
+    assert len(zones) == 6
+    assert all(zone.p > 0.01 / len(zones) > zone.p_normal for zone in zones)
