@@ -128,7 +128,8 @@ def written(
     body : str or int, optional
         One of several bodies by its name or number; all where not given.
     general : {"f", "m", "c", "v"}, optional
-        Class of ISO 2768-1 that gives the file's lengths limits where they have none.
+        Class of ISO 2768-1 that gives the file's lengths limits where they have none; the one that the file states,
+        if any, where not given.
 
     Raises
     ------
@@ -161,7 +162,7 @@ def _asked_by_file(record: Step | Mesh, units: str, general: str | None) -> tupl
     if not isinstance(record, Step):
         return ()
     found = pmi.read(read_bytes(record.file, step.MOST_BYTES))
-    if general:
+    if general := general or found.general:
         found = replace(found, characteristics=tuple(pmi.with_general(each, general) for each in found.characteristics))
     return drawn(record.part_in(units), found, units) if found.characteristics else ()
 

@@ -7,6 +7,7 @@ composed of others; its value stands in a representation, its limits beside it o
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -123,11 +124,14 @@ class Pmi:
         Numbers of the faces of each datum, by letter.
     order : dict of int to int
         Place among all instances of the file, from 0, by number.
+    general : str
+        Class of the general tolerance that the file states (ISO 2768-1); empty where it states none.
     """
 
     characteristics: tuple[Characteristic, ...]
     datums: dict[str, tuple[int, ...]] = field(default_factory=dict)
     order: dict[int, int] = field(default_factory=dict)
+    general: str = ""
 
 
 def read(data: bytes) -> Pmi:
@@ -139,6 +143,7 @@ def read(data: bytes) -> Pmi:
         (*file.dimensions(), *file.tolerances()),
         file.datums(),
         {number: place for place, number in enumerate(file.part.order)},
+        file.general(),
     )
 
 
@@ -213,6 +218,15 @@ class _File:
             faces = (face for feature in features for face in self.faces(feature))
             found[letter] = tuple(dict.fromkeys((*found.get(letter, ()), *faces)))
         return found
+
+    def general(self) -> str:
+        """Class of ISO 2768-1 of a representation of default tolerances: `m` of "m", "ISO 2768-mK"."""
+        for number in self.part.numbers("DESCRIPTIVE_REPRESENTATION_ITEM"):
+            told = self.part[number].of("DESCRIPTIVE_REPRESENTATION_ITEM") or ()
+            if _text(told, 0).lower() == "tolerance class":
+                named = re.fullmatch(r"(?:ISO ?2768-?)?([fmcv])[HKL]?", _text(told, 1))
+                return named[1] if named else ""
+        return ""
 
     def faces(self, aspect: int | None) -> tuple[int, ...]:
         """Numbers of the faces of a shape aspect, or of what a dimension is of."""

@@ -91,6 +91,16 @@ def test_a_general_tolerance_is_of_lengths_that_have_none():
         assert pmi.with_general(same, "m") is same
 
 
+@pytest.mark.parametrize(
+    ("stated", "found"), [("m", "m"), ("ISO 2768-mK", "m"), ("ISO2768-f", "f"), ("ISO 22081", ""), ("x", "")]
+)
+def test_a_general_tolerance_that_the_file_states(stated, found):
+    text = "#30=DIMENSIONAL_SIZE(#20,'diameter');\n" + _measure(31, 20.0) + _shown(30, 31)
+    text += "#60=REPRESENTATION('default tolerance',(#61),#8);\n"
+    text += f"#61=DESCRIPTIVE_REPRESENTATION_ITEM('tolerance class','{stated}');\n"
+    assert _read(text).general == found
+
+
 @pytest.mark.parametrize("note", ["theoretical", "auxiliary"])
 def test_a_dimension_that_has_no_limits_for_a_reason(note):
     text = "#30=DIMENSIONAL_SIZE(#20,'diameter');\n" + _measure(31, 20.0) + _shown(30, 31, 32)
