@@ -174,3 +174,14 @@ class _Reader:
 def _unescaped(found: re.Match[str]) -> str:
     """Characters beyond ASCII."""
     return bytes.fromhex(found[1]).decode("utf-16-be", "replace") if found[1] else chr(int(found[2], 16))
+
+
+def number_at(parameters: tuple[Any, ...], place: int) -> int | None:
+    """A reference among parameters, as a number; None where there is none."""
+    found = parameters[place] if len(parameters) > place else None
+    return int(found) if isinstance(found, Reference) else None
+
+
+def text_at(parameters: tuple[Any, ...], place: int) -> str:
+    found = parameters[place] if len(parameters) > place else None
+    return found.strip() if isinstance(found, str) else ""
