@@ -27,9 +27,8 @@ class Values:
         for item in self._items.get(number, ()):
             value, told = self.measure(item)
             if value is not None:
-                name = text_at(
-                    self.part[item].of("REPRESENTATION_ITEM", "MEASURE_REPRESENTATION_ITEM") or (), 0
-                ).lower()
+                named = self.part[item].of("REPRESENTATION_ITEM", "MEASURE_REPRESENTATION_ITEM") or ()
+                name = text_at(named, 0).lower()
                 values["upper" if "upper" in name else "lower" if "lower" in name else "nominal"] = value
                 unit = unit or told
         nominal, upper, lower = (values.get(name) for name in ("nominal", "upper", "lower"))
