@@ -43,6 +43,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "calibrate": ("small.toml", "--images", "10"),
     "calibrate-camera": ("0.png", "1.png", "2.png", "--square", "25", "--model", "k1,k2,p1,p2"),
     "budget": ("calibrated_rig", "--monte-carlo", "--reach", "0.005"),
+    "msa": ("calibrated_rig",),
     "cost": ("small.toml", "--budget", "1s", "--out", "cost"),
     "explore": ("small.toml",),
     "hard": ("--area", "reflectance"),

@@ -6,7 +6,7 @@ import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,6 +18,7 @@ from validation.cli.common import (
     check_number,
     check_seed,
     commands,
+    first_picture,
     parse_pose,
     parse_poses,
     progress,
@@ -82,7 +83,7 @@ def budget_command(given: Options) -> None:
     from imaging.light.appearance import is_plain
     from validation import budgets
 
-    picture = _picture(loaded, *poses)
+    picture = first_picture(loaded, *poses)
     if given.stations and not is_plain(loaded):
         raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {given.stations}")
     with progress("simulating the picture for its bias", "renders", at_once=True):
@@ -124,16 +125,6 @@ def _write(found: SceneBudget, facts: dict, out: Path) -> None:
     write_csv(found, out / "budget.csv")
     budget_figure.draw(found, out / "budget.png")
     page.write_station(station.of_budget(found), scene.title or scene.name, out / "budget.html")
-
-
-def _picture(scene: scenes.Scene, sensor: Any, light: Any) -> scenes.Picture:
-    """Of the poses that are given, the others as in the scene's first setting."""
-    first = scene.settings[0] if scene.settings else None
-    if first is None and (sensor is None or (light is None and scene.free)):
-        raise scenes.InvalidInput("--sensor and --light must be given for a scene without settings, got none")
-    sensor = first.sensor if sensor is None else sensor
-    light = first.light if light is None and first is not None else light
-    return scenes.Picture.of(scene, sensor, () if light is None else light)
 
 
 def write_csv(found: SceneBudget, path: Path) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from scenes import InvalidInput, Pose
+from scenes import InvalidInput, Picture, Pose, Scene
 from validation.batch.stopped import CONTINUE, Interrupted, interruption
 from validation.cli import verbosity
 from validation.report.terminal import console
@@ -94,6 +94,16 @@ def check_number(option: str, value: float | None, least: float, most: float) ->
         raise InvalidInput(f"{option} must be at least {least}, got {value}")
     if value is not None and not value <= most:
         raise InvalidInput(f"{option} must be at most {most}, got {value}")
+
+
+def first_picture(scene: Scene, sensor: Any, light: Any) -> Picture:
+    """Of the poses that are given, the others as in the scene's first setting."""
+    first = scene.settings[0] if scene.settings else None
+    if first is None and (sensor is None or (light is None and scene.free)):
+        raise InvalidInput("--sensor and --light must be given for a scene without settings, got none")
+    sensor = first.sensor if sensor is None else sensor
+    light = first.light if light is None and first is not None else light
+    return Picture.of(scene, sensor, () if light is None else light)
 
 
 def check_left_out(context: typer.Context, where: str, *options: str) -> None:

@@ -1,0 +1,126 @@
+"""``ice msa``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import scenes
+from scenes.status import is_trusted
+from validation.cli.common import (
+    Json,
+    SceneName,
+    check_number,
+    commands,
+    first_picture,
+    parse_pose,
+    parse_poses,
+    progress,
+    say,
+    taking,
+)
+from validation.report.terminal import console
+from validation.strict_json import plain
+
+if TYPE_CHECKING:
+    from planner.uncertainty.msa import Guard, Study
+    from validation.msa import Predicted
+
+commands = commands()
+_MOST = 1000
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a study is asked for."""
+
+    scene: SceneName
+    sensor: Annotated[
+        str | None, typer.Option(metavar="P,A", help="Polar angle and azimuth; the first setting's if left out.")
+    ] = None
+    light: Annotated[str | None, typer.Option(metavar="P,A", help="Of the free light, or of each.")] = None
+    study: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="A study that was made: columns operator, part and each measurand."),
+    ] = None
+    placed_once: Annotated[
+        bool, typer.Option("--placed-once", help="A part stays in the fixture for all repeats of an operator.")
+    ] = False
+    cost_accepted: Annotated[
+        float | None, typer.Option(metavar="COST", help="Of a bad part that is accepted: the guard band of least cost.")
+    ] = None
+    cost_rejected: Annotated[
+        float | None, typer.Option(metavar="COST", help="Of a good part that is rejected, with --cost-accepted.")
+    ] = None
+    as_json: Json = False
+
+
+@commands.command("msa")
+@taking(Options)
+def msa_command(given: Options) -> None:
+    """Measurement system analysis before the station exists: %GRR, ndc, Cg, Cgk, and a study compared with them.
+
+    Exit status 1 if a component of the study is larger than predicted beyond chance.
+    """
+    from planner.uncertainty.msa import check, too_large
+    from validation import budgets, msa
+    from validation.report import msa_table
+
+    _check(given)
+    poses = None if given.sensor is None else parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
+    picture = first_picture(scenes.load(given.scene), *poses)
+    with progress("simulating the picture for its bias", "renders", at_once=True):
+        found = budgets.budget_of(picture)
+    told = msa.predicted(found, placed_once=given.placed_once)
+    made = msa.read(given.study, tuple(each.name for each in told)) if given.study else {}
+    checks = {each.name: check(made[each.name], each.components) for each in told if each.name in made}
+    wrong = [each.name for each in told if is_trusted(each.status) and too_large(checks.get(each.name, ()))]
+    guards = {each.name: _guard(each, given) for each in told}
+    if given.as_json:
+        rows = [_facts(each, made.get(each.name), checks.get(each.name, ()), guards[each.name]) for each in told]
+        where = {"sensor": list(picture.sensor), "lights": [list(pose) for pose in picture.lights]}
+        say(plain({"scene": picture.scene.name, **where, "measurands": rows}), True, "")
+    else:
+        console().print(msa_table.report(told, made, checks, guards), highlight=False)
+    if wrong:
+        raise typer.Exit(1)
+
+
+def _check(given: Options) -> None:
+    costs = given.cost_accepted, given.cost_rejected
+    if (costs[0] is None) != (costs[1] is None):
+        raise scenes.InvalidInput("--cost-accepted must be used with --cost-rejected, got one of them")
+    for option, cost in (("--cost-accepted", costs[0]), ("--cost-rejected", costs[1])):
+        check_number(option, cost, 1e-12, 1e12)
+
+
+def _guard(each: Predicted, given: Options) -> Guard | None:
+    """Of least cost; None without costs, tolerance or the parts' spread."""
+    from planner.uncertainty.msa import cheapest_guard
+    from planner.uncertainty.risks import Limits
+
+    spread, zone = each.components.parts, each.tolerance
+    if given.cost_accepted is None or given.cost_rejected is None or not spread or zone is None:
+        return None
+    costs, limits = (given.cost_accepted, given.cost_rejected), Limits.of(each.nominal, zone)
+    return cheapest_guard(each.nominal, spread, each.u, limits, *costs)
+
+
+def _facts(each: Predicted, study: Study | None, rows: tuple, guard: Guard | None) -> dict[str, Any]:
+    from planner.uncertainty.msa import too_large
+
+    kept = each.components
+    return {
+        "name": each.name, "unit": each.unit, "status": each.status, **asdict(kept), "reproducibility": kept.appraisers,
+        "grr": kept.grr, "grr_of_total": kept.grr_of_total, "constant": each.constant, "ndc": kept.ndc,
+        "grr_of_tolerance": kept.grr_of(each.width) if each.width else None, "cg": each.cg, "cgk": each.cgk,
+        "guard": None if guard is None else {"width": guard.width, "cost": guard.cost},
+        "study": None if study is None else {
+            "operators": study.values.shape[0], "parts": study.values.shape[1], "repeats": study.values.shape[2],
+            "found": asdict(study.components), "components": [asdict(row) for row in rows],
+            "too_large": list(too_large(rows)),
+        },
+    }  # fmt: skip
