@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from scipy import special  # not stats, which takes longer to load than a budget to compute
 
 from planner.uncertainty.checks import check_finite
 from planner.uncertainty.groups import Group, Source, members
@@ -209,8 +209,9 @@ def coverage_factor(p: float, dof: float = math.inf) -> float:
     if not dof >= 1 - 1e-9:
         raise InvalidInput(f"dof must be at least 1, got {dof}")
     if math.isinf(dof):
-        return float(stats.norm.ppf((1 + p) / 2))
-    return float(stats.t.ppf((1 + p) / 2, float(math.floor(dof * (1 + 1e-9)))))  # a sum that rounds to 8.999... is 9
+        return float(special.ndtri((1 + p) / 2))
+    whole = float(math.floor(dof * (1 + 1e-9)))  # a sum that rounds to 8.999... is 9
+    return float(special.stdtrit(whole, (1 + p) / 2))
 
 
 def _check(sources: tuple[Source, ...], sensitivities: dict[str, float], value: float, p: float) -> None:

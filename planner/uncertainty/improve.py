@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from scipy import stats
+from scipy import special
 
 from planner.uncertainty.budget import Budget, coverage_factor, effective_dof
 from planner.uncertainty.checks import check_not_negative, check_positive
@@ -119,7 +119,7 @@ def _largest(budget: Budget, source: str, U_wanted: float) -> float:
     kept = [row for row in budget.contributions if row.source != source]
     others, dofs = [row.contribution for row in kept], [row.dof for row in kept]
     rest, own = math.hypot(*others), budget.of(source).dof
-    most = math.sqrt(max((U_wanted / stats.norm.ppf((1 + budget.p) / 2)) ** 2 - rest**2, 0.0))
+    most = math.sqrt(max((U_wanted / special.ndtri((1 + budget.p) / 2)) ** 2 - rest**2, 0.0))
     if math.isinf(own) and all(math.isinf(dof) for dof in dofs):
         return most
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from planner.uncertainty.checks import check_finite, check_not_negative
 from scenes.errors import InvalidInput
@@ -117,7 +117,7 @@ def _standard_quantile(given: Input, p: np.ndarray) -> np.ndarray:
         case "normal":
             return special.ndtri(p)
         case "t":
-            return stats.t.ppf(p, given.dof)
+            return np.where(p > 0, special.stdtrit(given.dof, p), -np.inf)
         case "triangular":
             return math.sqrt(6) * np.sign(p - 0.5) * (1 - np.sqrt(2 * np.minimum(p, 1 - p)))
         case "arcsine":

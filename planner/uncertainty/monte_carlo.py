@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from planner.uncertainty.checks import check_not_negative
 from planner.uncertainty.groups import Source, draw
@@ -203,7 +203,7 @@ def _summary(values: np.ndarray, p: float) -> tuple[float, float, float, float]:
 
 def _factor(blocks: int) -> float:
     """Times the standard deviation of the blocks' mean: what 95 % of the results are within."""
-    return max(2.0, float(stats.t.ppf(0.975, blocks - 1)))
+    return max(2.0, float(special.stdtrit(blocks - 1, 0.975)))
 
 
 def _result(name: str, column: np.ndarray, p: float, stable: bool, limit: float, scatter: np.ndarray) -> MonteCarlo:
