@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import special
+from scipy import special  # not stats, which takes longer to load than a budget to compute
 
 from planner.uncertainty.checks import check_finite
 from planner.uncertainty.groups import Group, Source, members
@@ -210,9 +210,8 @@ def coverage_factor(p: float, dof: float = math.inf) -> float:
         raise InvalidInput(f"dof must be at least 1, got {dof}")
     if math.isinf(dof):
         return float(special.ndtri((1 + p) / 2))
-    return float(
-        special.stdtrit(float(math.floor(dof * (1 + 1e-9))), (1 + p) / 2)
-    )  # a sum that rounds to 8.999... is 9
+    whole = float(math.floor(dof * (1 + 1e-9)))  # a sum that rounds to 8.999... is 9
+    return float(special.stdtrit(whole, (1 + p) / 2))
 
 
 def _check(sources: tuple[Source, ...], sensitivities: dict[str, float], value: float, p: float) -> None:

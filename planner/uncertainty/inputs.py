@@ -117,7 +117,7 @@ def _standard_quantile(given: Input, p: np.ndarray) -> np.ndarray:
         case "normal":
             return special.ndtri(p)
         case "t":
-            return special.stdtrit(given.dof, p)
+            return np.where(p > 0, special.stdtrit(given.dof, p), -np.inf)
         case "triangular":
             return math.sqrt(6) * np.sign(p - 0.5) * (1 - np.sqrt(2 * np.minimum(p, 1 - p)))
         case "arcsine":
