@@ -90,9 +90,11 @@ def facets(
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, components(len(normals), joins), -1)
-    pieces = edging | curved(shape, region, ~smooth & ~edging)
-    pieces |= _unsure(shape, facet)[shape.faces].any(1) | _chords(shape, facet, smooth)
-    return Facets(region, smooth, pieces & ~smooth)
+    curves = edging | curved(shape, region, ~smooth & ~edging)
+    unsure = _unsure(shape, facet)
+    within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
+    curves |= within | _chords(shape, facet | unsure, smooth)
+    return Facets(region, smooth, curves & ~smooth)
 
 
 def _flush(shape: Chains, pieces: list[list[int]], linked: np.ndarray) -> np.ndarray:
