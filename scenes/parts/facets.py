@@ -72,9 +72,11 @@ def facets(
         The circles.
     """
     shape = Chains.of(vertices, chains, normals, areas)
-    around, edging = _of_rims(chains, rims)
+    known = {frozenset(ends): i for i, (ends, *_) in enumerate(chains)}
+    pieces = [[known[frozenset(pair)] for pair in rim.pieces] for rim in rims]
+    around, edging = _of_rims(chains, rims, pieces)
     linked, crossed = _linked(shape, ~around & ~edging)
-    flush = _flush(shape, chains, rims, linked)
+    flush = _flush(shape, pieces, linked)
     edging &= ~flush
     facet = np.zeros(len(normals), bool)
     facet[shape.faces[around].ravel()] = True
@@ -88,39 +90,37 @@ def facets(
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, components(len(normals), joins), -1)
-    pieces = edging | curved(shape, region, ~smooth & ~edging)
-    pieces |= _unsure(shape, facet)[shape.faces].any(1) | _chords(shape, facet, smooth)
-    return Facets(region, smooth, pieces & ~smooth)
+    curves = edging | curved(shape, region, ~smooth & ~edging)
+    unsure = _unsure(shape, facet)
+    within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
+    curves |= within | _chords(shape, facet | unsure, smooth)
+    return Facets(region, smooth, curves & ~smooth)
 
 
-def _flush(shape: Chains, chains: list[Chain], rims: Iterable[Rim], linked: np.ndarray) -> np.ndarray:
+def _flush(shape: Chains, pieces: list[list[int]], linked: np.ndarray) -> np.ndarray:
     """Pieces of circles in which a curved surface continues the circle's face smoothly, as a fillet does; bool, (C,).
 
     What bends no more than within that surface, or hardly at all, is no edge: there is nothing to see.
     """
-    known = {frozenset(ends): i for i, (ends, *_) in enumerate(chains)}
-    pieces = [[known[frozenset(pair)] for pair in rim.pieces] for rim in rims]
-    of_rims = np.zeros(len(chains), bool)
+    of_rims = np.zeros(len(shape.bend), bool)
     of_rims[[i for each in pieces for i in each]] = True
     here = of_rims & (shape.bend <= _SLIGHT)
     here = _continued(shape, here, linked) | here & (shape.certain <= _TANGENT_BEND)
-    found = np.zeros(len(chains), bool)
+    found = np.zeros(len(shape.bend), bool)
     for each in pieces:
         found[each] = shape.length[each] @ here[each] > _MOSTLY * shape.length[each].sum()
     return found
 
 
-def _of_rims(chains: list[Chain], rims: Iterable[Rim]) -> tuple[np.ndarray, np.ndarray]:
+def _of_rims(chains: list[Chain], rims: Iterable[Rim], pieces: list[list[int]]) -> tuple[np.ndarray, np.ndarray]:
     """Chains between two neighbours in the wall of a circle, and the circles' own pieces; bool, each (C,)."""
-    known = {frozenset(ends): i for i, (ends, *_) in enumerate(chains)}
     pairs: dict[frozenset, list[int]] = {}
     for i, (_, faces, _) in enumerate(chains):
         pairs.setdefault(frozenset(faces), []).append(i)
     around, edging = np.zeros(len(chains), bool), np.zeros(len(chains), bool)
-    for rim in rims:
-        pieces = [known[frozenset(pair)] for pair in rim.pieces]
-        edging[pieces] = True
-        walls = [next(f for f in chains[i][1] if f != rim.face) for i in pieces]
+    for rim, each in zip(rims, pieces, strict=True):
+        edging[each] = True
+        walls = [next(f for f in chains[i][1] if f != rim.face) for i in each]
         for pair in zip(walls, walls[1:] + walls[:1], strict=True):
             around[pairs.get(frozenset(pair), [])] = True
     return around, edging & ~around

@@ -77,7 +77,7 @@ def _divided(reader: Any, shape: Any, cut: Any, pieces: int) -> list[dict[str, A
     _cut(cut, pieces, controlled=cut is shape)
     every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
     if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
-        raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(shape)}")
+        raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(cut)}")
     return [
         {"name": _name(reader, face), **_surface(face), **_triangles(divided)}
         for face, divided in zip(_faces(shape), _faces(cut), strict=True)
@@ -262,9 +262,17 @@ def _named(faces: list[Any]) -> str:
 
 
 def _hint(shape: Any) -> str:
-    """That one of several bodies may do without those faces."""
-    bodies = len(_parts([shape], "TopAbs_SOLID", "Solid"))
-    return f" (of {bodies} bodies object.body chooses one)" if bodies > 1 else ""
+    """That one of several bodies may do without those faces, and which cannot."""
+    bodies = _parts([shape], "TopAbs_SOLID", "Solid")
+    if len(bodies) < 2:
+        return ""
+    broken = [
+        str(number)
+        for number, body in enumerate(bodies, 1)
+        if any(_mesh(face) is None for face in _parts([body], "TopAbs_FACE", "Face"))
+    ]
+    which = f", but for {', '.join(broken)}" if 0 < len(broken) < len(bodies) else ""
+    return f" (of {len(bodies)} bodies object.body chooses one{which})"
 
 
 def _edges(faces: list[Any]) -> list[dict[str, Any]]:

@@ -118,7 +118,7 @@ def test_a_triangle_beside_facets_that_is_about_as_narrow_is_no_plane_face(area,
 
 @pytest.mark.parametrize(("turn", "is_chord"), [(28, False), (32, True), (78, True), (82, False)])
 def test_a_side_of_a_last_triangle_is_a_chord_unless_bends_run_along_it_or_square_to_it(turn, is_chord):
-    """Within 30 degrees of it, or 10 of the square: the facet is face 0, the others' sides at 55 say nothing."""
+    """Within 30 degrees of it, or 10 of the square: the facet is face 0; a side at 55 degrees says nothing."""
     ways = [(np.cos(a), np.sin(a), 0) for a in np.radians([0, turn, 125])]
     shape, facet = sides([(0, 1), (0, 2), (0, 3)], ways), np.arange(4) != 1
     smooth = np.array([False, True, True])
@@ -231,10 +231,10 @@ def test_pieces_of_a_circles_edge_and_the_bends_of_its_wall():
     rim = rims.Rim(0, loop, np.zeros(3), 1.0)
     chains = [((1, 0), (0, 1), True), ((1, 2), (2, 0), True), ((2, 0), (0, 3), True), ((1, 4), (1, 2), True),
               ((2, 5), (3, 2), True), ((0, 6), (1, 3), True), ((4, 5), (2, 4), True)]  # fmt: skip
-    around, edging = facets._of_rims(chains, [rim])
+    around, edging = facets._of_rims(chains, [rim], [[0, 1, 2]])
     assert edging.tolist() == [True] * 3 + [False] * 4
     assert around.tolist() == [False] * 3 + [True] * 3 + [False]
-    nothing = facets._of_rims(chains, [])
+    nothing = facets._of_rims(chains, [], [])
     assert not nothing[0].any()
     assert not nothing[1].any()
 

@@ -217,7 +217,7 @@ def test_ways_to_a_closed_surface(kernel):
     assert (len(found["faces"][0]["triangles"]), found["segments"]) == (4, 96)
 
 
-def test_faces_that_cannot_be_cut_are_refused(kernel):
+def test_faces_that_cannot_be_cut_are_refused(kernel, monkeypatch):
     """By their number, what the first is, and where."""
     kernel.whole = body(plain("f"))
     with pytest.raises(Unusable, match=r"of faces that can be cut into triangles, got 1 that cannot: a surface$"):
@@ -229,6 +229,10 @@ def test_faces_that_cannot_be_cut_are_refused(kernel):
     solids = [Shape(name, (plain(name),), kind="solid") for name in "abc"]
     kernel.whole = Shape("bodies", [*(solid.parts[0] for solid in solids), *solids])
     with pytest.raises(Unusable, match=r"got 3 that cannot: a surface \(of 3 bodies object.body chooses one\)$"):
+        step_kernel.record(b"data", 20, 2000)
+    uncut = solids[0].parts[0], solids[2].parts[0]
+    monkeypatch.setattr(step_kernel, "_mesh", lambda face: None if face in uncut else "triangles")
+    with pytest.raises(Unusable, match=r"got 2 that .*\(of 3 bodies object.body chooses one, but for 1, 3\)$"):
         step_kernel.record(b"data", 20, 2000)
 
 

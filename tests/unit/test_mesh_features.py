@@ -103,7 +103,7 @@ def disc(*rim, sections=72):
     ids=["rounded", "chamfered", "shallow"],
 )
 def test_a_circle_in_which_a_rounding_goes_on_smoothly_is_no_edge(rim, radii):
-    """From the upper face into a rounding of nine steps nothing is seen; a chamfer of 45 degrees or a slope is."""
+    """From the upper face into a rounding of nine steps nothing is seen; a chamfer of 45 degrees, a slope of 8 are."""
     solid = mesh.solid(disc(*rim))
     assert sorted(circle.radius for circle in solid.circles) == pytest.approx(radii)
     assert not solid.sharp
