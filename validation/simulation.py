@@ -173,14 +173,13 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
 @lru_cache(maxsize=64)
 def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     alike = picture.with_scene(_without_textures(picture.scene))
-    found = _until_quiet(alike, method, how)
+    found, told = _until_quiet(alike, method, how)
     if alike is picture or alike.scene == picture.scene:
         return found
-    told = measure.propagate(how.rough.image(alike), alike, estimator=method.locator, threshold=method.threshold)
-    uneven = Unevenness.about(picture, told.measurands.response)
+    uneven = Unevenness.about(picture, told.response)
     plane, image = (
         np.where(np.isfinite(found.bias), np.sqrt(uneven.variances(response)), np.inf)
-        for response in (told.measurands.response, told.measurands.response_image)
+        for response in (told.response, told.response_image)
     )
     return replace(
         found,
@@ -199,30 +198,35 @@ def _with_textures(picture: Picture, method: Method, how: How, states: tuple[str
     return tuple(MISFIT if new and old == OK else old for new, old in zip(misfit, states, strict=True))
 
 
-def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
-    """With few rays if these do; else with all, and with renders of other rays until they do, `_MOST` at most."""
-    asked = method.locator, method.threshold
+def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction, PropagatedValues]:
+    """With few rays if these do; else with all, and with renders of other rays until they do, `_MOST` at most.
 
-    def of(images: Images, told: PropagatedValues | None = None) -> Correction:
-        return measure.correction(images, picture, *asked, told)
+    Beside it what propagation says of the mean of the first of these renders.
+    """
+
+    def of(images: Images, told: PropagatedValues) -> Correction:
+        return measure.correction(images, picture, method.locator, method.threshold, told)
+
+    def propagated(renders: tuple[np.ndarray, ...]) -> PropagatedValues:
+        clean = np.mean(renders, axis=0)
+        return measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
 
     images = None
     pair = how.by_pixel and not _is_below(picture, LARGE_RANDOM)  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
-        images = _completed(picture, few, (), how)
-        found = of(images)
+        images, told = _completed(picture, few, (), how), propagated(few)
+        found = of(images, told)
         if _is_quiet(found):
-            return found
+            return found, told
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
-    clean = np.mean(renders, axis=0)
-    told = measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
+    told = propagated(renders)
     found = of(images, told)
     while len(images.renders) < _MOST and not _is_quiet(found):
         images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
         found = of(images, told)
-    return found
+    return found, told
 
 
 def _rebased(images: Images, renders: tuple[np.ndarray, ...]) -> Images:

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -328,7 +329,8 @@ def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u
 
     def quiet(picture, method, how):
         asked.append(picture)
-        return _made(picture)
+        told = measure.propagate(block_image(small_task1, *POSES), picture, estimator=method.locator)
+        return _made(picture), told.measurands
 
     monkeypatch.setattr(simulation, "_until_quiet", quiet)
     grain = {"kind": "statistical", "where": "top", "contrast": 0.1, "correlation": 0.3}
@@ -384,7 +386,10 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
     monkeypatch.setattr(simulation, "_completed", lambda picture, renders, *given: asked.append(renders))
     monkeypatch.setattr(simulation.measure, "correction", lambda *given: _made(picture, sources=quiet))
-    simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
+    monkeypatch.setattr(simulation.measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
+    found, told = simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
+    assert told == (count - 1) / 2  # of the renders' mean
+    assert found.sources["rendering"].tolist() == [0.01]
     assert asked == [tuple(range(count))]
 
 
