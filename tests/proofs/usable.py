@@ -1,10 +1,10 @@
 """``python -m tests.proofs usable``: how many values of the bundled scenes are `ok` at random poses that measure them?
 
 Camera and lights stand 10 to 50 degrees off the vertical, anywhere around; lights that go with the camera, or face it,
-stand where they do. Before a light that faces it the camera stands up to twice as far off as in the scene's settings: the
-light has to be behind the part. Measured is a value where a prediction without an image says that it can be, whatever its bias;
-then its bias is simulated and taken off, as `ice measure` does, by the scene's default estimator, and it is counted
-whether it is `ok`. At least 90 % have to be.
+stand where they do. Before a light that faces it the camera stands up to twice as far off as in the scene's settings:
+the light has to be behind the part. Measured is a value where a prediction without an image says that it can be,
+whatever its bias; then its bias is simulated and taken off, as `ice measure` does, by the scene's default estimator,
+and it is counted whether it is `ok`. At least 90 % have to be.
 """
 
 from __future__ import annotations
