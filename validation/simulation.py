@@ -1,13 +1,13 @@
 """The noise-free images that tell the bias of a picture: renders of other rays, and of what the scene is not sure of.
 
-Reflectances change what light does between faces, and contrasts. Where there is one material, what it does is told by
-the render itself, less its direct light (`validation.dimmed`); else each is rendered reflecting less, with few rays,
-and subtracted from the same render of the scene as it is. Lights that stand elsewhere are rendered so, too, in large
-images their direct light alone; of plain scenes the closed form of the bias tells what lights do. Two renders that are
-compared have the same rays, one by one, or their difference would be noise; and what makes a picture brighter or darker
-as a whole, which moves nothing, is not told by few rays but by the render itself. All of them are made where something
-is measured (everywhere for estimators that look farther), and with few rays first: where the noise of these is far
-below sigma or the tolerance, more rays would tell nothing.
+Reflectances change what light does between faces, and contrasts: each is rendered reflecting less, with few rays, and
+subtracted from the same render of the scene as it is. In images above a megapixel, where that takes long, what one
+material does is told by the render itself, less its direct light (`validation.dimmed`). Lights that stand elsewhere are
+rendered so, too, in large images their direct light alone; of plain scenes the closed form of the bias tells what
+lights do. Two renders that are compared have the same rays, one by one, or their difference would be noise; and what
+makes a picture brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
+All of them are made where something is measured (everywhere for estimators that look farther), and with few rays first:
+where the noise of these is far below sigma or the tolerance, more rays would tell nothing.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from measure.unevenness import Unevenness
 from render import EffectTolerance, Quality
 from render import variant as variants
 from render.build import MANY_WAYS
-from render.large import LARGE_RANDOM, near_required
+from render.large import LARGE, LARGE_RANDOM, near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
 from scenes.status import MISFIT, OK
@@ -48,7 +48,6 @@ _NOISY = 8  # pictures in which a texture is looked for
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
 _ALIKE = {"supersample": 2, "samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
-_SMALL = {"supersample": 4, "edge_samples": 256}  # of direct light in small images, where they take little time
 
 
 @dataclass(frozen=True)
@@ -74,11 +73,6 @@ class How:
     def compared(self) -> How:
         """With few rays, the same ones of all pictures from one place: their differences are told, not they."""
         return replace(self, quality=replace(self.quality, **_ALIKE))
-
-    @property
-    def beside(self) -> How:
-        """With rays that tell direct light well: by what they tell wrongly, what a render holds beside it is wrong."""
-        return replace(self, quality=replace(self.compared.quality, **_SMALL))
 
     @property
     def by_pixel(self) -> bool:
@@ -179,14 +173,13 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
 @lru_cache(maxsize=64)
 def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     alike = picture.with_scene(_without_textures(picture.scene))
-    found = _until_quiet(alike, method, how)
+    found, told = _until_quiet(alike, method, how)
     if alike is picture or alike.scene == picture.scene:
         return found
-    told = measure.propagate(how.rough.image(alike), alike, estimator=method.locator, threshold=method.threshold)
-    uneven = Unevenness.about(picture, told.measurands.response)
+    uneven = Unevenness.about(picture, told.response)
     plane, image = (
         np.where(np.isfinite(found.bias), np.sqrt(uneven.variances(response)), np.inf)
-        for response in (told.measurands.response, told.measurands.response_image)
+        for response in (told.response, told.response_image)
     )
     return replace(
         found,
@@ -205,30 +198,35 @@ def _with_textures(picture: Picture, method: Method, how: How, states: tuple[str
     return tuple(MISFIT if new and old == OK else old for new, old in zip(misfit, states, strict=True))
 
 
-def _until_quiet(picture: Picture, method: Method, how: How) -> Correction:
-    """With few rays if these do; else with all, and with renders of other rays until they do, `_MOST` at most."""
-    asked = method.locator, method.threshold
+def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction, PropagatedValues]:
+    """With few rays if these do; else with all, and with renders of other rays until they do, `_MOST` at most.
 
-    def of(images: Images, told: PropagatedValues | None = None) -> Correction:
-        return measure.correction(images, picture, *asked, told)
+    Beside it what propagation says of the mean of the first of these renders.
+    """
 
-    camera, images = picture.scene.camera, None
-    pair = how.by_pixel and camera.width * camera.height > LARGE_RANDOM  # a small one has few pixels, and is cheap
+    def of(images: Images, told: PropagatedValues) -> Correction:
+        return measure.correction(images, picture, method.locator, method.threshold, told)
+
+    def propagated(renders: tuple[np.ndarray, ...]) -> PropagatedValues:
+        clean = np.mean(renders, axis=0)
+        return measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
+
+    images = None
+    pair = how.by_pixel and not _is_below(picture, LARGE_RANDOM)  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
-        images = _completed(picture, few, (), how)
-        found = of(images)
+        images, told = _completed(picture, few, (), how), propagated(few)
+        found = of(images, told)
         if _is_quiet(found):
-            return found
+            return found, told
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
-    clean = np.mean(renders, axis=0)
-    told = measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
+    told = propagated(renders)
     found = of(images, told)
     while len(images.renders) < _MOST and not _is_quiet(found):
         images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
         found = of(images, told)
-    return found
+    return found, told
 
 
 def _rebased(images: Images, renders: tuple[np.ndarray, ...]) -> Images:
@@ -260,9 +258,8 @@ def _completed(
     """With the images, or numbers, of what the scene is not sure of."""
     first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared, how.active(picture)
     direct, whole, dimmed = cache(partial(alike.direct, active=active)), cache(alike.image), None
-    if active & MANY_WAYS == {_BETWEEN}:
-        alone = partial(how.beside.direct, picture, active) if _is_small(picture) else partial(direct, picture)
-        dimmed = of_one_surface(picture, renders, alone, _u(picture.scene.uncertainty.reflectance))
+    if active & MANY_WAYS == {_BETWEEN} and not _is_below(picture, LARGE):
+        dimmed = of_one_surface(picture, renders, partial(direct, picture), _u(picture.scene.uncertainty.reflectance))
     if dimmed is None:
         others = _steps(first, whole, _of_other_surfaces(picture), picture)
     changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
@@ -270,13 +267,13 @@ def _completed(
         known |= {LIGHT: _light_in_closed_form(picture)}
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
-        made = whole if _is_small(picture) else direct
+        made = whole if _is_below(picture, LARGE) else direct
         changed[LIGHT] = _steps(first, made, _with_lights_moved(picture), picture)
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
 
 
-def _is_small(picture: Picture) -> bool:
-    return picture.scene.camera.width * picture.scene.camera.height <= LARGE_RANDOM
+def _is_below(picture: Picture, pixels: int) -> bool:
+    return picture.scene.camera.width * picture.scene.camera.height <= pixels
 
 
 def _steps(

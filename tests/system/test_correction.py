@@ -255,7 +255,7 @@ def test_rays_are_added_until_their_noise_does_not_matter(
         return exact + (rough if is_rough else fine) * noise
 
     monkeypatch.setattr(simulation.How, "_rendered", made)
-    found = simulation._until_quiet(picture, Method("gradient"), simulation.How())
+    found, _ = simulation._until_quiet(picture, Method("gradient"), simulation.How())
     assert found.renders == renders
     assert (asked.count(True), asked.count(False)) == (few, all_)
 

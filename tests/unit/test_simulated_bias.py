@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -328,7 +329,8 @@ def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u
 
     def quiet(picture, method, how):
         asked.append(picture)
-        return _made(picture)
+        told = measure.propagate(block_image(small_task1, *POSES), picture, estimator=method.locator)
+        return _made(picture), told.measurands
 
     monkeypatch.setattr(simulation, "_until_quiet", quiet)
     grain = {"kind": "statistical", "where": "top", "contrast": 0.1, "correlation": 0.3}
@@ -384,37 +386,39 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
     monkeypatch.setattr(simulation, "_completed", lambda picture, renders, *given: asked.append(renders))
     monkeypatch.setattr(simulation.measure, "correction", lambda *given: _made(picture, sources=quiet))
-    simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
+    monkeypatch.setattr(simulation.measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
+    found, told = simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
+    assert told == (count - 1) / 2  # of the renders' mean
+    assert found.sources["rendering"].tolist() == [0.01]
     assert asked == [tuple(range(count))]
 
 
-@pytest.mark.parametrize("small", [False, True])
-def test_direct_light_is_rendered_once_for_all_that_compare_with_it(monkeypatch, small):
-    """What surfaces send to each other, and each of three steps of the light's place: four images, none twice.
+@pytest.mark.parametrize("below", [False, True])
+def test_what_is_compared_is_rendered_once(monkeypatch, below):
+    """The part as it is, and each of three steps of the light's place: four images, none twice.
 
-    Of a small image lights are moved in renders of all light, and direct light is rendered with rays that tell it
-    better.
+    Below a megapixel with all light, and one more where it reflects less; else direct light alone, whose rest in the
+    render is what surfaces send to each other.
     """
-    scene, asked, fine = scenes.load("bracket"), [], []
+    scene, asked = scenes.load("bracket"), []
 
     def rendered(how, shown, effects, seed):
         asked.append((shown, how.quality.alike, effects == "auto" or "interreflection" in effects))
-        fine.append(how.quality.edge_samples == 256)
         return np.full((2, 2), 50.0 + len(asked))
 
     monkeypatch.setattr(How, "_rendered", rendered)
     monkeypatch.setattr(simulation, "of_one_surface", lambda picture, renders, direct, part: renders[0] - direct())
-    monkeypatch.setattr(simulation, "LARGE_RANDOM", 1 << 20 if small else 1)
+    monkeypatch.setattr(simulation, "LARGE", 1 << 20 if below else 1)
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
     images = simulation._completed(picture, (np.full((2, 2), 77.0),), (), How())
-    assert [each[1:] for each in asked] == [(True, False)] + [(True, small)] * (3 + small)
-    assert [shown is picture for shown, *_ in asked].count(True) == 1 + small
-    assert len({shown for shown, *_ in asked}) == 4
-    assert fine == [small] + [False] * (3 + small)
-    assert [each.flat[0] for each in images.changed["reflectance"]] == [77 - 51]
-    dark, here = scene.noise.dark_level, 55 if small else 51
-    expected = [dark + (77 - dark) * (50 + k - dark) / (here - dark) for k in (2, 3, 4)]
-    assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(expected, rel=1e-12)
+    assert [each[1:] for each in asked] == [(True, below)] * (4 + below)
+    assert [shown is picture for shown, *_ in asked].count(True) == 1
+    assert len({shown for shown, *_ in asked}) == 4 + below
+    dark, here, first = scene.noise.dark_level, 52 if below else 51, 3 if below else 2
+    levels = [dark + (77 - dark) * (50 + k - dark) / (here - dark) for k in (1, *range(first, first + 3))]
+    reflected = [levels[0]] if below else [77 - 51]
+    assert [each.flat[0] for each in images.changed["reflectance"]] == pytest.approx(reflected, rel=1e-12)
+    assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(levels[1:], rel=1e-12)
 
 
 def test_what_few_rays_tell_of_all_levels_moves_no_edge():
