@@ -22,7 +22,7 @@ _SMALL = {"width": 480, "height": 384, "focal_px": 1800.0}
 def folder(tmp_path_factory):
     """The plate's scene as a file, another whose true place is off by 0.09 mm in x and y, and a picture."""
     made = tmp_path_factory.mktemp("toleranced")
-    scene = toleranced.scene(made, NAMES, **_TINY)
+    scene = toleranced.scene(made, NAMES, 40, **_TINY)
     data = scene.model_dump(mode="json", exclude_defaults=True, exclude={"name"})
     data["object"]["file"] = "toleranced.ply"
     data["settings"] = [{"sensor": [20, 300], "light": [30, 350]}]
