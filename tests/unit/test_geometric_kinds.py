@@ -89,7 +89,7 @@ B, C, D, FRONT, LEFT = {"circle": "c2"}, {"circle": "c6"}, {"circle": "c4"}, {"e
         ("distance", [B, {"crossing": ["e5", "e99"]}], {}, r"crossing\[1\].edge must be one of e1, e2"),
         ("distance", [B, {"midpoint": [B, {"circle": "c99"}]}], {}, r"midpoint\[1\].circle must be one of c1"),
         ("offset", [{"centre_line": ["e5", "e8"]}, FRONT], {}, "features must be a corner or a circle, then"),
-        ("offset", [B, {"midpoint": [B, D]}], {}, "features must be a corner or a circle, then an edge for kind offset"),
+        ("offset", [B, {"midpoint": [B, D]}], {}, "must be a corner or a circle, then an edge for kind offset"),
     ],
 )  # fmt: skip
 def test_what_is_refused(plate, kind, features, more, line):
