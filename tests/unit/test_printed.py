@@ -128,6 +128,7 @@ def test_measured_values_and_their_decisions_are_printed(value, decision):
     quantity = SimpleNamespace(name="slot", kind="width", tolerance=Tolerance(plus=0.09, minus=0.02))
     other = SimpleNamespace(name="lean", kind="angle", tolerance=None)
     found = SimpleNamespace(
+        picture=SimpleNamespace(scene=SimpleNamespace(zones=())),
         quantities=(quantity, other), sigma=np.array([0.0024, 0.5]),
         covariance=np.array([[5.76e-6, 2e-4], [2e-4, 0.25]]),
         u=np.array([0.004, np.nan]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
@@ -166,6 +167,7 @@ def test_what_a_correction_is_not_sure_of_is_decided_with(value, state, decision
     """+-0.09 about 10; sigma 0.004 and u(bias) 0.003 make u = 0.005, of which two are kept from both limits."""
     quantity = SimpleNamespace(name="slot", kind="width", tolerance=Tolerance(plus=0.09, minus=0.09))
     found = SimpleNamespace(
+        picture=SimpleNamespace(scene=SimpleNamespace(zones=())),
         quantities=(quantity,), sigma=np.array([0.004]), covariance_image=np.array([[0.09]]), nominal=np.array([10.0]),
         units=("mm",), value=np.array([value]), value_image=np.array([812.0]), status=np.array([state]),
         bias=np.array([-0.034]), u_bias=np.array([0.003]), u=np.array([0.005]),
