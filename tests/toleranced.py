@@ -54,10 +54,10 @@ ASKED: tuple[tuple[str, str, list, float | None, dict[str, float]], ...] = (
 VALUES: dict[str, float] = {name: value for *_, values in ASKED for name, value in values.items()}
 
 
-def scene(folder: Path, names: tuple[str, ...] = (), **camera: object) -> Scene:
-    """The plate in a folder, with all measurands or those of some names, seen at about 12 px a mm."""
+def scene(folder: Path, names: tuple[str, ...] = (), facets: int = 96, **camera: object) -> Scene:
+    """The plate in a folder, with all measurands or those of some names, bores of so many facets, 12 px a mm."""
     file = folder / "toleranced.ply"
-    parts.toleranced().export(file)
+    parts.toleranced(facets).export(file)
     asked = [
         {"name": name, "kind": kind, "features": features} | ({} if tolerance is None else {"tolerance": tolerance})
         for name, kind, features, tolerance, _ in ASKED

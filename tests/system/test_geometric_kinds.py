@@ -5,11 +5,16 @@ import json
 import numpy as np
 import pytest
 
+import measure
+import planner
+import render
 import scenes
 from scenes.files.written import edited
 from tests import toleranced
 from tests.commands import ice
 from tests.proofs import kinds
+from validation.budgets import capability
+from validation.zones import measured_zones
 
 pytestmark = pytest.mark.render
 NAMES = ("in edges", "slot to plate", "right", "bolts", "slot")
@@ -22,7 +27,7 @@ _SMALL = {"width": 480, "height": 384, "focal_px": 1800.0}
 def folder(tmp_path_factory):
     """The plate's scene as a file, another whose true place is off by 0.09 mm in x and y, and a picture."""
     made = tmp_path_factory.mktemp("toleranced")
-    scene = toleranced.scene(made, NAMES, **_TINY)
+    scene = toleranced.scene(made, NAMES, 40, **_TINY)
     data = scene.model_dump(mode="json", exclude_defaults=True, exclude={"name"})
     data["object"]["file"] = "toleranced.ply"
     data["settings"] = [{"sensor": [20, 300], "light": [30, 350]}]
@@ -123,3 +128,30 @@ def test_all_kinds_scatter_as_propagated(tmp_path):
     assert not any(row.holds(len(rows), 3.0) for row in rows)  # negative control
     assert len(zones) == 6
     assert all(zone.p > 0.01 / len(zones) > zone.p_normal for zone in zones)
+
+
+def test_a_block_quickly(task1):
+    """Plan, picture, value, zone and budget of a corner in its datum system, a turn and a line of the block."""
+    corner, front, left = {"vertex": "v7", "edges": ["e7", "e9"]}, {"edge": "e4"}, {"edge": "e11"}
+    block = task1.model_dump(exclude={"task", "settings", "same_scale"}) | {"measurands": [
+        {"name": "place", "kind": "true_position", "features": [corner, front, left], "tolerance": 0.2},
+        {"name": "upright", "kind": "perpendicularity", "features": [{"edge": "e9"}, front], "tolerance": 0.1},
+        {"name": "along", "kind": "parallelism", "features": [{"edge": "e7"}, front], "tolerance": 0.1},
+    ]}  # fmt: skip
+    scene = scenes.Scene.model_validate(block)
+    found = planner.plan(scene, step_deg=15, refined=False)
+    told = {each.name: each for each in found.prediction.measurands}
+    ratios = {name: each.variance_object**0.5 / 0.1 for name, each in told.items()}
+    assert found.prediction.worst_ratio == pytest.approx(max(ratios.values()))
+    assert found.limiting == max(ratios, key=ratios.get)
+    picture = scenes.Picture.of(scene, found.sensor, found.light)
+    clean = render.image(picture)
+    seen = measure.measure(render.expose(clean, scene.noise, np.random.default_rng(1), 1)[0], picture)
+    (zone,) = measured_zones(seen)
+    away = seen.value[:2] - [-12.5, -7.5]  # e4 runs towards -x, and -y is to its left
+    assert zone.size.value == pytest.approx(2 * np.linalg.norm(away), rel=1e-6)
+    assert zone.decision == "pass"
+    budget = planner.budget(picture)
+    risks = {each.name: capability(budget, m)["specific_risk"] for m, each in enumerate(budget.measurands)}
+    assert (risks["place.x"], risks["place.y"]) == (None, None)
+    assert risks["upright"] < 1e-6

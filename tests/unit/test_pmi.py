@@ -312,9 +312,9 @@ def test_a_new_scene_asks_for_what_the_file_does(tmp_path):
         for name in row["measurands"] if row["zone"] is None else ():
             limits = measured[name].tolerance
             one = 1.0 if row["unit"] == "deg" else scale
-            assert (limits.plus, limits.minus) == pytest.approx(
-                (abs(row["plus"]) * one, abs(row["minus"]) * one), rel=1e-5
-            )
+            half = None if row["zone"] is None else row["zone"] / 2  # of the middle of two planes, to either side
+            wanted = (abs(row["plus"]), abs(row["minus"])) if half is None else (half, half)
+            assert (limits.plus, limits.minus) == pytest.approx((wanted[0] * one, wanted[1] * one), rel=1e-5)
     text = (tmp_path / "ctc.toml").read_text()
     unseen = [row for row in rows.values() if row["reason"] and "not seen" in row["reason"]]
     assert text.count("# [[measurands]]") == len(unseen) > 0
