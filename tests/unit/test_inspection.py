@@ -296,8 +296,11 @@ def test_a_zone_without_light_or_that_is_not_ok_is_not_decided(toleranced):
     (zone,) = inspection.inspect(replace(toleranced, picture=dark, u_bias=np.full(3, np.nan))).zones
     assert (zone.size.is_known, zone.decision) == (False, "undecided")
     states = np.array(["ok", "clutter", "ok"], object)
-    (zone,) = inspection.inspect(replace(toleranced, status=states)).zones
-    assert (zone.status, zone.decision) == ("clutter", "undecided")
+    for doubts in (np.full(3, 1e-3), np.array([1e-3, np.inf, 1e-3])):  # its bias known, and not at all
+        made = inspection.inspect(replace(toleranced, status=states, u_bias=doubts))
+        (zone,) = made.zones
+        assert (zone.status, zone.decision, made.decision) == ("clutter", "undecided", "undecided")
+        assert inspection_files._zone_cells(zone)[-2:] == ("undecided", "clutter")
 
 
 def test_a_zone_is_handed_on_below_its_numbers(toleranced, tmp_path):
