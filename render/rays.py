@@ -14,7 +14,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 AT_ONCE = 1 << 24  # rays in one call, which bounds the memory
 LARGE_AT_ONCE = 1 << 22  # the same beside a large image
@@ -135,6 +134,8 @@ class Rays:
     @cached_property
     def _table(self) -> np.ndarray:
         """Sobol points, shape (dimensions, fine pixels of a pixel x block)."""
+        from scipy.stats import qmc  # slow to load, and only needed to render
+
         power = math.ceil(math.log2(self.supersample**2 * self._block))
         dimensions = 2 + _DIMENSIONS * SURFACES  # whatever the bounces: the scrambling depends on their number
         points = qmc.Sobol(dimensions, rng=self.seed).random_base2(power)

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
-import measure
 import render
 from render.phenomena import EffectTolerance, Influence
 from scenes import Picture, Scene, Setting
@@ -94,6 +93,8 @@ class _Runs:
     """Distance and variance of one setting with some effects, for each seed."""
 
     def __init__(self, scene: Scene, setting: Setting, effects, quality: render.Quality) -> None:
+        import measure  # what a scene calls for is said without it
+
         found, self.seconds = [], float("inf")
         for seed in _SEEDS:
             started = time.perf_counter()
@@ -106,7 +107,7 @@ class _Runs:
 
 def _row(setting: Setting, name: str, estimated: Influence, base: _Runs, runs: _Runs) -> Switched:
     bias, change = runs.values - base.values, runs.variances / base.variances - 1
-    errors = stats.t.isf(_FALSE_ALARM / 2, len(_SEEDS) - 1) / np.sqrt(len(_SEEDS))
+    errors = -special.stdtrit(len(_SEEDS) - 1, _FALSE_ALARM / 2) / np.sqrt(len(_SEEDS))
     resolution = [
         float(errors * differences.std(ddof=1)) + rounding
         for differences, rounding in zip((bias, change), _ROUNDING, strict=True)
