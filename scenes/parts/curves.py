@@ -19,13 +19,10 @@ def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
     surfaces on both sides are smooth there. A straight edge that continues a curve is much longer than its pieces; a
     last piece without a facet beside it turns as much as those before.
     """
-    pairs, ends, alone = _meetings(shape, open_)
-    away = shape.along[pairs] * np.where(ends == 0, 1.0, -1.0)[..., None]
-    cosine = -(away[:, 0] * away[:, 1]).sum(1) / shape.length[pairs].prod(1)
+    pairs, ends, alone = meetings(shape, open_)
+    cosine, turn, straight = turns_at(shape, pairs, ends)
     sides = np.sort(np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces), 1)
     alike = (sides[pairs[:, 0]] == sides[pairs[:, 1]]).all(1) & (region[shape.faces[pairs[:, 0]]] >= 0).any(1)
-    turn = np.arccos(np.clip(cosine, -1, 1))
-    straight = turn * shape.length[pairs].min(1) <= shape.unsure
     run = components(len(shape.bend), pairs[alike & straight])
     length = np.bincount(run, shape.length)[run][pairs]
     turns = (cosine >= _CURVE) & ~straight
@@ -41,7 +38,15 @@ def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
     return np.isin(run, run[found]) & open_
 
 
-def _meetings(shape: Chains, open_: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def turns_at(shape: Chains, pairs: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of pairs (n, 2) that meet with some of their ends: cosine of the turn, the turn, rad, and whether it is none."""
+    away = shape.along[pairs] * np.where(ends == 0, 1.0, -1.0)[..., None]
+    cosine = -(away[:, 0] * away[:, 1]).sum(1) / shape.length[pairs].prod(1)
+    turn = np.arccos(np.clip(cosine, -1, 1))
+    return cosine, turn, turn * shape.length[pairs].min(1) <= shape.unsure
+
+
+def meetings(shape: Chains, open_: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs (n, 2) of chains that meet in a vertex, which of their ends meet there, and whether no other one does."""
     rows = np.flatnonzero(open_)
     vertex = shape.ends[rows].ravel()

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.parts.chains import Chain, Chains, components, pairs_of
-from scenes.parts.curves import curved
+from scenes.parts.curves import curved, meetings, turns_at
 from scenes.parts.rims import Rim
 
 _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
@@ -243,7 +243,7 @@ def _chords(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
     """Chains that are a side of a facet of three sides, and no straight line of its surface; bool, shape (C,).
 
     Along a straight line of a curved surface, or square to it, run the bends about it; where a file cuts the border of
-    a surface into chords, its last triangles have bends at any angle.
+    a surface into chords, its last triangles have bends at any angle. What goes on in a line is no chord.
     """
     triangle = facet & (np.bincount(shape.faces.ravel(), minlength=len(facet)) == 3)
     side = np.flatnonzero(triangle[shape.faces].ravel())
@@ -254,7 +254,11 @@ def _chords(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
     fits = smooth[other // 2] & ((cosine >= _ALONG) | (cosine <= _SQUARE))
     straight = ~triangle[shape.faces].ravel()
     straight[here[fits]] = True
-    return ~smooth & ~straight.reshape(-1, 2).all(1)
+    straight = straight.reshape(-1, 2).all(1)
+    rows, ends, _ = meetings(shape, ~smooth)
+    goes_on = rows[turns_at(shape, rows, ends)[2]]
+    straight[goes_on] = True
+    return ~smooth & ~straight
 
 
 def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
