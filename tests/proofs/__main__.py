@@ -28,6 +28,7 @@ from tests.proofs.rate import rate
 from tests.proofs.stations import stations
 from tests.proofs.uneven import uneven
 from tests.proofs.usable import usable
+from tests.proofs.varied import varied
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
 app.command()(affine_fits)
@@ -53,6 +54,7 @@ app.command()(processed)
 app.command()(rate)
 app.command()(uneven)
 app.command()(usable)
+app.command()(varied)
 app.command()(stations)
 
 if __name__ == "__main__":
