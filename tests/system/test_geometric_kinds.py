@@ -14,6 +14,7 @@ from tests import toleranced
 from tests.commands import ice
 from tests.proofs import kinds
 from validation.budgets import capability
+from validation.inspection import expanded
 from validation.zones import measured_zones
 
 pytestmark = pytest.mark.render
@@ -147,7 +148,7 @@ def test_a_block_quickly(task1):
     picture = scenes.Picture.of(scene, found.sensor, found.light)
     clean = render.image(picture)
     seen = measure.measure(render.expose(clean, scene.noise, np.random.default_rng(1), 1)[0], picture)
-    (zone,) = measured_zones(seen)
+    (zone,) = measured_zones(seen, expanded(seen))
     away = seen.value[:2] - [-12.5, -7.5]  # e4 runs towards -x, and -y is to its left
     assert zone.size.value == pytest.approx(2 * np.linalg.norm(away), rel=1e-6)
     assert zone.decision == "pass"

@@ -14,7 +14,7 @@ from measure.saturation import _BRIGHTER, expected, limits, saturated
 from scenes import Noise, Picture
 from scenes.status import CLUTTER, OK
 from tests.oracle import block_image
-from validation import kept, simulation
+from validation import inspection, kept, simulation
 from validation.cli import measurands
 from validation.remeasured import Method
 
@@ -134,9 +134,10 @@ def test_far_from_the_end_no_more_than_chance_is_allowed(picture, exact):
 def test_why_is_said_with_the_number(picture, exact, off):
     image = _exposed(picture, _lit(picture.scene.noise, exact, 1.15))[0]
     found = measure.measure(image, picture, correction=off)
-    rows = measurands.facts(found)
+    inspected = inspection.inspect(found)
+    rows = measurands.facts(inspected)
     assert (rows[0]["status"], rows[0]["u_bias"], rows[0]["u"]) == (CLUTTER, None, None)
-    (told,) = measurands.reasons(rows, found)
+    (told,) = measurands.reasons(rows, inspected)
     assert told == (
         f"distance: {int(found.saturated)} pixels near the edges are at the end of the sensor's scale, not as in the "
         "simulation, whose bias is another one"

@@ -16,9 +16,9 @@ from scenes.measurands import position
 from validation import plan_check
 from validation.batch import work
 from validation.batch.repeated import RepeatedValues, row_status
-from validation.cli import budget as budget_command
 from validation.cli import plan as plan_command
 from validation.cli import recorded
+from validation.cli.common import first_picture
 from validation.explore import preview
 from validation.report import sharpness
 
@@ -200,14 +200,14 @@ def test_poses_that_are_given_take_the_place_of_the_first_settings(task1):
     first = task1.settings[0]
     given = Pose(33, 44), Pose(11, 22)
     for sensor, light in ((None, None), (given[0], None), (None, given[1]), given):
-        found = budget_command._picture(task1, sensor, light)
+        found = first_picture(task1, sensor, light)
         assert found.sensor == (sensor or first.sensor)
         assert found.lights == ((light or first.light),)
     bare = task1.model_copy(update={"settings": ()})
-    assert budget_command._picture(bare, *given).lights == (given[1],)
+    assert first_picture(bare, *given).lights == (given[1],)
     for some in ((None, None), (given[0], None), (None, given[1])):
         with pytest.raises(InvalidInput, match="--sensor and --light must be given for a scene without settings"):
-            budget_command._picture(bare, *some)
+            first_picture(bare, *some)
 
 
 @pytest.mark.parametrize(

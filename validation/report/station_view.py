@@ -158,12 +158,14 @@ def draw(
     spots, tied = balloons(anchors, frame.beside(len(both)) if values else frame.around(len(both)))
     for (each, mark, text), anchor, spot in zip(both, tied, spots, strict=True):
         _requirement(axis, each, [placed(line) for line in mark.lines], anchor, spot)
-        aside = 1 if spot[0] > frame.width / 2 else -1
-        axis.text(spot[0] + 0.2 * aside, spot[1], text, fontsize=TEXT, va="center", ha="left" if aside > 0 else "right")
+        if text:
+            aside = 1 if spot[0] > frame.width / 2 else -1
+            side = "left" if aside > 0 else "right"
+            axis.text(spot[0] + 0.2 * aside, spot[1], text, fontsize=TEXT, va="center", ha=side)
     return inline(figure, key, label)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """Where the picture lies in its figure, inches.
 
