@@ -1,6 +1,7 @@
 """Where light from other surfaces may be seen, and how much of it is left where all reflect less."""
 
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -124,6 +125,7 @@ def test_other_scenes_are_rendered(picture):
     assert of_one_surface(picture, (rendered,), lambda: rendered, 0.0) is None
 
 
+@pytest.mark.skipif(find_spec("OCP") is None, reason="needs OpenCASCADE: pip install 'ice-vision[step]'")
 def test_a_limb_that_is_measured_leaves_light_between_other_faces_as_it_is(tmp_path):
     """Of a flange: walls of its holes have light from themselves.
 

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import measure
 import planner
 import scenes
 from render.phenomena.base import Influence
@@ -263,7 +264,7 @@ def test_effects_are_compared_over_five_seeds(monkeypatch):
 
     monkeypatch.setattr(effects_check.render, "image", image)
     monkeypatch.setattr(effects_check.time, "perf_counter", lambda: next(clock))
-    monkeypatch.setattr(effects_check.measure, "propagate", lambda image, scene, sensor: SimpleNamespace(
+    monkeypatch.setattr(measure, "propagate", lambda image, scene, sensor: SimpleNamespace(
         value_px=90.0 + image, variance_px2=0.5 * image))  # fmt: skip
     runs = effects_check._Runs(None, SimpleNamespace(sensor="s", light="l"), "all", effects_check.render.Quality())
     assert asked == [("s", "l", seed, "all") for seed in range(5)]
