@@ -177,6 +177,44 @@ def test_an_interruption_at_start_up_is_one_line(number, wait, start_up):
     assert early or process.returncode == 128 + number
 
 
+LOST = """
+import os, signal, time
+from validation.cli import main
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGTERM)
+    sum(range(1000))
+
+class Destroyed:
+    def __del__(self):
+        interrupt()
+
+def swallowed(_):
+    Destroyed()
+    time.sleep(30)
+    return 0
+
+def renamed(_):
+    said = ""
+    try:
+        interrupt()
+    except BaseException as error:
+        said = str(error)
+    raise RuntimeError("no schema, for " + said)
+
+main._run = {}
+main.main()
+"""
+
+
+@pytest.mark.parametrize("fate", ["swallowed", "renamed"])
+def test_an_interruption_that_other_code_loses_ends_the_command(fate):
+    """Swallowed by a destructor, or made another error that keeps its text alone, as a schema's builder does."""
+    done = subprocess.run([sys.executable, "-c", LOST.format(fate)], capture_output=True, text=True, timeout=60)
+    assert (fate == "swallowed") == ("Exception ignored" in done.stderr)
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (143, "stopped: terminated")
+
+
 def test_broken_images_say_one_line(tmp_path):
     """libpng's own line does not come as well."""
     path = tmp_path / "a.png"

@@ -21,6 +21,8 @@ def __getattr__(name: str):
 
 
 _FLAGS = ("-q", "--quiet", "-v", "--verbose")
+_PAUSE = 1.0  # seconds until an interruption that was lost is raised again
+_raised: list[BaseException] = []  # of interruptions: some libraries keep but the text of an error that they meet
 
 
 def main() -> None:
@@ -39,6 +41,8 @@ def main() -> None:
         code = 141
     except BaseException as error:
         code = _told(error)
+    finally:
+        _again(None)
     sys.exit(code)
 
 
@@ -52,18 +56,37 @@ def _run(arguments: list[str]) -> int:
 
 
 def _interrupted(number: int, _frame) -> None:
-    from validation.batch.stopped import Interrupted
+    """Raise the interruption, and every second once more: an exception that meets a destructor is lost in it."""
+    _again(number)
+    _interrupt(number)
 
-    for other in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(other, signal.SIG_IGN)  # once is enough
-    raise Interrupted("interrupted" if number == signal.SIGINT else "terminated", 128 + number)
+
+def _again(number: int | None) -> None:
+    """Raise the interruption every second from now on; with None never again."""
+    if not hasattr(signal, "setitimer"):
+        return
+    if number is None:
+        signal.signal(signal.SIGALRM, signal.SIG_IGN)
+    else:
+        signal.signal(signal.SIGALRM, lambda *_: _interrupt(number))
+    pause = 0 if number is None else _PAUSE
+    signal.setitimer(signal.ITIMER_REAL, pause, pause)
+
+
+def _interrupt(number: int) -> None:
+    from validation.batch.stopped import Interrupted, interruption
+
+    if interruption(sys.exc_info()[1]) is None:  # else it is being dealt with: once is enough
+        _raised.append(Interrupted("interrupted" if number == signal.SIGINT else "terminated", 128 + number))
+        raise _raised[-1]
 
 
 def _told(error: BaseException) -> int:
-    """Print one line; the exit status."""
+    """Print one line; the exit status. What ends an interrupted command is the interruption, whatever became of it."""
+    from validation.batch.stopped import interruption
     from validation.cli.ending import ending
 
-    line, code = ending(error)
+    line, code = ending(interruption(error) or [error, *_raised][-1])
     if line:
         print(line, file=sys.stderr)
     return code
