@@ -40,7 +40,7 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 141
     except BaseException as error:
-        code = _told(error)
+        code = _told(_cause(error))
     finally:
         _again(None)
     sys.exit(code)
@@ -81,12 +81,18 @@ def _interrupt(number: int) -> None:
         raise _raised[-1]
 
 
+def _cause(error: BaseException) -> BaseException:
+    """What ends an interrupted command is the interruption, whatever a library made of it."""
+    from validation.batch.stopped import Interrupted
+
+    return error if isinstance(error, Interrupted) or not _raised else _raised[-1]
+
+
 def _told(error: BaseException) -> int:
-    """Print one line; the exit status. What ends an interrupted command is the interruption, whatever became of it."""
-    from validation.batch.stopped import interruption
+    """Print one line; the exit status."""
     from validation.cli.ending import ending
 
-    line, code = ending(interruption(error) or [error, *_raised][-1])
+    line, code = ending(error)
     if line:
         print(line, file=sys.stderr)
     return code
