@@ -20,14 +20,14 @@ from scenes.measurands.features import (
     Side,
     Wall,
     along_of,
+    check_off_line,
+    check_parallel,
     places,
 )
 from scenes.measurands.features import tag_of_feature as _tag_of_basic
 from scenes.parts.solid import Solid
 
-_ALONG = np.sin(np.radians(1.0))  # sine of the angle between edges that have a centre line, at most
 _ACROSS = np.sin(np.radians(5.0))  # of edges that have a crossing, at least
-_OFF_LINE = 1e-3  # of a pattern's size: how far from one line its centres are, at least
 
 EdgeName = Annotated[str, Field(min_length=1)]
 
@@ -97,8 +97,7 @@ class CentreLine(Between):
     def check(self, solid: Solid, key: str) -> None:
         """Within 1 degree of parallel."""
         super().check(solid, key)
-        if np.linalg.norm(np.cross(*(along_of(solid, part) for part in self.parts))) > _ALONG:
-            raise ValueError(f"{key} must be edges within 1 degree of parallel, got {', '.join(self.centre_line)}")
+        check_parallel(solid, key, self.parts, self.centre_line)
 
     def made(self, seen: Any, plane: np.ndarray | None) -> Line:
         """From the middle between the first edge's first end and the second edge to that between its last and it."""
@@ -140,9 +139,7 @@ class PitchCircle(Between):
     def check(self, solid: Solid, key: str) -> None:
         """Not on one line."""
         super().check(solid, key)
-        points = places(solid, self.parts)
-        if np.linalg.svd(points - points.mean(0))[1][1] < _OFF_LINE * np.ptp(points, axis=0).max():
-            raise ValueError(f"{key} must be circles that are not on one line, got {', '.join(self.pitch_circle)}")
+        check_off_line(key, places(solid, self.parts), self.pitch_circle)
 
     def made(self, seen: Any, plane: np.ndarray | None) -> Point:
         """Its centre."""

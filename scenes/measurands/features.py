@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _DIGITS = 6  # by which components of a normal are compared, so that rounding chooses none
 _FLAT = 1e-6  # of the object's size: how far a feature may be from the plane of the others
+_PARALLEL = np.sin(np.radians(1.0))  # sine of the angle between lines that count as parallel, at most
+_OFF_LINE = 1e-3  # of a pattern's size: how far from one line its centres are, at least
 
 
 class Corner(Model):
@@ -266,6 +268,30 @@ def along_of(solid: Solid, side: Side | Between) -> np.ndarray:
     """Unit vector along an edge or a line between others, (3,)."""
     start, stop = ends_of(solid, side)
     return (stop - start) / np.linalg.norm(stop - start)
+
+
+def check_parallel(solid: Solid, key: str, sides: tuple[Side | Between, ...], names: tuple[str, ...]) -> None:
+    """Two lines are within 1 degree of parallel.
+
+    Raises
+    ------
+    ValueError
+        If they are not; ``names`` are said.
+    """
+    if np.linalg.norm(np.cross(*(along_of(solid, side) for side in sides))) > _PARALLEL:
+        raise ValueError(f"{key} must be edges within 1 degree of parallel, got {', '.join(names)}")
+
+
+def check_off_line(key: str, centres: np.ndarray, names: tuple[str, ...]) -> None:
+    """Centres of circles, (n, 3), are not on one line.
+
+    Raises
+    ------
+    ValueError
+        If they are; ``names`` are said.
+    """
+    if np.linalg.svd(centres - centres.mean(0))[1][1] < _OFF_LINE * np.ptp(centres, axis=0).max():
+        raise ValueError(f"{key} must be circles that are not on one line, got {', '.join(names)}")
 
 
 def _check_corner(solid: Solid, key: str, corner: Corner) -> None:

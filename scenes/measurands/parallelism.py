@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from scenes.measurands.evaluated import Evaluated, across_line
-from scenes.measurands.features import along_of
+from scenes.measurands.features import check_parallel
 from scenes.measurands.kind import MEASURANDS, MeasurandKind, turn
-
-_MOST = np.sin(np.radians(1.0))  # of an angle that is meant to be none
 
 
 class Parallelism(MeasurandKind):
@@ -24,8 +20,7 @@ class Parallelism(MeasurandKind):
     def check(self, solid, key, quantity) -> None:
         """Within 1 degree of parallel."""
         super().check(solid, key, quantity)
-        if np.linalg.norm(np.cross(*(along_of(solid, feature) for feature in quantity.features))) > _MOST:
-            raise ValueError(f"{key} must be edges within 1 degree of parallel, got {', '.join(quantity.edges)}")
+        check_parallel(solid, key, quantity.features, quantity.edges)
 
     def evaluated(self, seen, quantity, plane) -> Evaluated:
         """Positive where the edge turns to the left of the datum, seen from outside."""

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from scenes.measurands.evaluated import Evaluated, circle_through
-from scenes.measurands.features import Centre
+from scenes.measurands.features import Centre, check_off_line
 from scenes.measurands.kind import MEASURANDS, MeasurandKind
-
-_OFF_LINE = 1e-3  # of the pattern's size
 
 
 class PitchCircle(MeasurandKind):
@@ -29,8 +27,7 @@ class PitchCircle(MeasurandKind):
         """Not on one line."""
         super().check(solid, key, quantity)
         points = np.array([solid.circle(feature.circle).centre for feature in quantity.features])
-        if np.linalg.svd(points - points.mean(0))[1][1] < _OFF_LINE * np.ptp(points, axis=0).max():
-            raise ValueError(f"{key} must be circles that are not on one line, got {', '.join(quantity.edges)}")
+        check_off_line(key, points, quantity.edges)
 
     def evaluated(self, seen, quantity, plane) -> Evaluated:
         """Twice the radius."""

@@ -10,7 +10,7 @@ from imaging.features.measurand import dense, measurands
 from imaging.pictures import Pictures
 from scenes import InvalidInput
 from tests import toleranced
-from tests.unit.test_kinds import moved
+from tests.unit.test_kinds import assert_gradients
 
 SENSOR = np.array([35.0, 70.0])
 
@@ -31,15 +31,7 @@ def test_values_in_the_object(plate):
 @pytest.mark.parametrize("find", [in_image, on_plane])
 def test_gradients_against_central_differences(plate, sensor, find):
     """Of every number by every parameter of what is found."""
-    known = measurands(Pictures.of(plate, np.array(sensor)))
-    seen, ours = known.seen, known.gradient if find is in_image else known.gradient_object
-    step = np.tile([1e-3, 1e-5], len(seen.names)).tolist() + [1e-4] * (3 * len(seen.circles))
-    for k, h in enumerate(step):
-        ahead, behind = (moved(seen, sign * h * np.eye(seen.count)[k]) for sign in (1, -1))
-        for m, quantity in enumerate(plate.quantities):
-            numeric = (find(ahead, quantity).value - find(behind, quantity).value) / (2 * h)
-            assert ours[m, k] == pytest.approx(numeric, rel=1e-6, abs=1e-7 * np.abs(ours[m]).max()), (quantity.name, k)
-    assert (np.abs(ours).max(-1) > 0).all()
+    assert_gradients(plate, sensor, find)
 
 
 def test_what_is_found_where_expected_is_the_object(plate):

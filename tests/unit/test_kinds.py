@@ -100,19 +100,24 @@ def test_values_in_the_image_by_projection(plate):
     assert value["bore"] == pytest.approx(np.linalg.norm(ends[1] - ends[0]), rel=1e-6)
 
 
-@pytest.mark.parametrize("sensor", [(35.0, 70.0), (60.0, 215.0), (0.0, 0.0)])
-@pytest.mark.parametrize("find", [in_image, on_plane])
-def test_gradients_against_central_differences(plate, sensor, find):
-    """Of every quantity by every parameter, the planes by exact back-projection; they differ from each other."""
-    known = measurands(Pictures.of(plate, np.array(sensor)))
+def assert_gradients(scene, sensor, find):
+    """Of every quantity by every parameter of what is found, against central differences."""
+    known = measurands(Pictures.of(scene, np.array(sensor)))
     seen, ours = known.seen, known.gradient if find is in_image else known.gradient_object
     step = np.tile([1e-3, 1e-5], len(seen.names)).tolist() + [1e-4] * (3 * len(seen.circles))
     for k, h in enumerate(step):
         ahead, behind = (moved(seen, sign * h * np.eye(seen.count)[k]) for sign in (1, -1))
-        for m, quantity in enumerate(plate.quantities):
+        for m, quantity in enumerate(scene.quantities):
             numeric = (find(ahead, quantity).value - find(behind, quantity).value) / (2 * h)
             assert ours[m, k] == pytest.approx(numeric, rel=1e-6, abs=1e-7 * np.abs(ours[m]).max()), (quantity.name, k)
     assert (np.abs(ours).max(-1) > 0).all()
+
+
+@pytest.mark.parametrize("sensor", [(35.0, 70.0), (60.0, 215.0), (0.0, 0.0)])
+@pytest.mark.parametrize("find", [in_image, on_plane])
+def test_gradients_against_central_differences(plate, sensor, find):
+    """Of every quantity by every parameter, the planes by exact back-projection; they differ from each other."""
+    assert_gradients(plate, sensor, find)
 
 
 def test_what_is_found_where_expected_is_the_object(plate):

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from validation.msa import Predicted
 
 commands = commands()
-_MOST = 1000
 
 
 @dataclass(frozen=True)
