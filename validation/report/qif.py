@@ -5,6 +5,7 @@ What each characteristic is, its limits, the measured value with its combined st
 
 from __future__ import annotations
 
+import math
 import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,12 +16,12 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from scenes.measurands.kinds import MEASURANDS
+from scenes.measurands.zone import joint_parts
 from scenes.status import is_trusted
 from scenes.units import Unit, in_unit
 from validation.inspection import Inspection
 
 _NAMESPACE = "http://qifstandards.org/xsd/qif3"
-_DEGREE = 0.017453292519943295
 _DECIDED = {"pass": "PASS", "fail": "FAIL", "undecided": "INDETERMINATE", None: "NOT_ANALYZED"}
 _OF_PART = {"pass": "PASS", "fail": "FAIL", "undecided": "UNKNOWN", None: "NOT_CALCULATED"}
 _MODES = {"DistanceBetween": "TWODIMENSIONAL", "AngleBetween": "TWODIMENSIONAL"}
@@ -73,7 +74,7 @@ class _Row:
 
 def _rows(found: Inspection) -> list[_Row]:
     """Every number, and every zone that several of them keep together."""
-    joint = {name for each in found.zones for name in each.zone.parts}
+    joint = joint_parts(each.zone for each in found.zones)
     rows = []
     for row in found.rows:
         told = row.requirement
@@ -100,7 +101,7 @@ def _units(root: Element, length: Unit) -> None:
     """Of lengths and angles."""
     units = _child(_child(root, "FileUnits"), "PrimaryUnits")
     for tag, base, name, factor in (
-        ("AngularUnit", "radian", "degree", _DEGREE),
+        ("AngularUnit", "radian", "degree", math.radians(1)),
         ("LinearUnit", "meter", length, in_unit(1.0, length, "m")),
     ):
         unit = _child(units, tag)
