@@ -22,7 +22,7 @@ def __getattr__(name: str):
 
 _FLAGS = ("-q", "--quiet", "-v", "--verbose")
 _PAUSE = 1.0  # seconds until an interruption that was lost is raised again
-_raised: list[BaseException] = []  # of interruptions: some libraries keep but the text of an error that they meet
+_came: list[int] = []  # signals: some libraries keep but the text of an error that they meet
 
 
 def main() -> None:
@@ -74,18 +74,24 @@ def _again(number: int | None) -> None:
 
 
 def _interrupt(number: int) -> None:
-    from validation.batch.stopped import Interrupted, interruption
+    from validation.batch.stopped import interruption
 
     if interruption(sys.exc_info()[1]) is None:  # else it is being dealt with: once is enough
-        _raised.append(Interrupted("interrupted" if number == signal.SIGINT else "terminated", 128 + number))
-        raise _raised[-1]
+        _came.append(number)  # the error itself would keep all that was going on until Python ends
+        raise _error(number)
 
 
 def _cause(error: BaseException) -> BaseException:
     """What ends an interrupted command is the interruption, whatever a library made of it."""
     from validation.batch.stopped import Interrupted
 
-    return error if isinstance(error, Interrupted) or not _raised else _raised[-1]
+    return error if isinstance(error, Interrupted) or not _came else _error(_came[-1])
+
+
+def _error(number: int) -> BaseException:
+    from validation.batch.stopped import Interrupted
+
+    return Interrupted("interrupted" if number == signal.SIGINT else "terminated", 128 + number)
 
 
 def _told(error: BaseException) -> int:
