@@ -178,7 +178,7 @@ def test_an_interruption_at_start_up_is_one_line(number, wait, start_up):
 
 
 LOST = """
-import os, signal, time
+import os, signal, sys, time
 from validation.cli import main
 
 def interrupt():
@@ -193,6 +193,14 @@ def swallowed(_):
     Destroyed()
     time.sleep(30)
     return 0
+
+class Held:
+    def __del__(self):
+        print("ends late" if sys.is_finalizing() else "ends in time")
+
+def plain(_):
+    held = Held()
+    interrupt()
 
 def renamed(_):
     said = ""
@@ -213,6 +221,12 @@ def test_an_interruption_that_other_code_loses_ends_the_command(fate):
     done = subprocess.run([sys.executable, "-c", LOST.format(fate)], capture_output=True, text=True, timeout=60)
     assert (fate == "swallowed") == ("Exception ignored" in done.stderr)
     assert (done.returncode, done.stderr.splitlines()[-1]) == (143, "stopped: terminated")
+
+
+def test_an_interruption_keeps_nothing_until_python_ends():
+    """An executor that ends only then complains, for its modules are gone."""
+    done = subprocess.run([sys.executable, "-c", LOST.format("plain")], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (143, "ends in time\n", "stopped: terminated\n")
 
 
 def test_broken_images_say_one_line(tmp_path):
