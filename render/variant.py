@@ -37,7 +37,8 @@ assert list(drjit.minimum(Float(1, 2, 3), 2)) == [1, 2, 2]
 _CUDA_PROBE = f"""
 import mitsuba
 mitsuba.set_variant("{CUDA}")
-scene = mitsuba.load_dict({{"type": "scene", "a": {{"type": "cube"}}, "b": {{"type": "constant"}}}})
+parts = {{"ray": {{"type": "direct"}}, "a": {{"type": "cube"}}, "b": {{"type": "constant"}}}}
+scene = mitsuba.load_dict({{"type": "scene", **parts}})
 assert float(mitsuba.render(scene, sensor=mitsuba.load_dict({{"type": "perspective"}}), spp=1).array[0]) >= 0
 """
 _NVIDIA = Path("/dev/nvidiactl")  # what its driver makes

@@ -47,6 +47,11 @@ def test_cuda_is_taken_where_there_is_a_driver_and_the_trial_succeeds(monkeypatc
     assert variant.choose() == found
 
 
+def test_the_trial_of_cuda_is_a_program_that_renders():
+    """It was not: it named no integrator, so every trial failed and CUDA was never taken."""
+    assert variant._runs(variant._CUDA_PROBE.replace(variant.CUDA, variant.SCALAR), dict(os.environ))
+
+
 def test_newest_library_that_works_is_taken(monkeypatch):
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
     monkeypatch.setattr(variant, "_candidates", lambda: ["/llvm/20", "/llvm/19", "/llvm/18"])
