@@ -28,6 +28,7 @@ _CELL, _CELLS = 0.2, 24  # standard deviations that a ray stands for, and how ma
 _SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
 _STEPS = 8  # of Newton's method
 _FARTHEST = 0.2  # px that a crossing may be moved: levels are known to a few percent, and so is the move
+_KNOWN = 0.05  # part of the brighter side that a contrast must have: levels so alike may be the other way round
 _STEEPER = 0.3  # by which the slope there may differ from a lone step's
 _ROUGH, _JUMP = 0.03, 0.2  # px of the shift, and part of the contrast, that neighbouring places may differ by
 _LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep another crossing in it may be
@@ -49,6 +50,8 @@ class RimLook:
         Squared contrast that the slope at the crossing tells, grey levels^2.
     noise_variance : ndarray, shape (n,)
         Mean of both sides, grey levels^2.
+    brightens : ndarray of bool, shape (n,)
+        Whether it is brighter outside the rim.
     good : ndarray of bool, shape (n,)
         Where the shift can be trusted: the crossing is near, about as steep as a lone step's, and as its neighbours.
     circle : Circle
@@ -58,6 +61,7 @@ class RimLook:
     shift: np.ndarray
     squared: np.ndarray
     noise_variance: np.ndarray
+    brightens: np.ndarray
     good: np.ndarray
     circle: Circle
 
@@ -69,7 +73,7 @@ class RimLook:
         then = (first + 1) % count
         told = (v[first] + share * (v[then] - v[first]) for v in (self.shift, self.squared, self.noise_variance))
         good = (self.good[first] | (share > 1 - _AT)) & (self.good[then] | (share < _AT))
-        return RimLook(*told, good, self.circle)
+        return RimLook(*told, self.brightens[first], good, self.circle)
 
 
 def places_around(pictures: Pictures, circle: Circle, spacing: float, most: int) -> int:
@@ -98,12 +102,13 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     moved = (crossing - alone) * width
     with np.errstate(divide="ignore", invalid="ignore"):
         good = (np.abs(slope / (sides[1] - sides[0]) - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)
+    good &= np.abs(sides[1] - sides[0]) >= _KNOWN * sides.max(0)
     good &= sides.max(0) <= sensor.headroom(scene.noise)
     good &= _steepest(levels, where, crossing, slope, scene.locator.window_px / width)
     shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
     noise = np.broadcast_to(noise, sides.shape).mean(0)
     squared = np.nan_to_num(slope) ** 2
-    return RimLook(shift, squared, noise, good & _steady(moved, slope), circle)
+    return RimLook(shift, squared, noise, sides[1] > sides[0], good & _steady(moved, slope), circle)
 
 
 def _steady(shift: np.ndarray, contrast: np.ndarray) -> np.ndarray:

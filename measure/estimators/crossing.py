@@ -42,6 +42,9 @@ class CrossingLocator:
         Ideal px across the edge for a recorded px.
     basis, level : ndarray, shapes (m, k) and (k, len(pixels))
         Their product is what all places of a position have in common; k may be 0.
+    signs : ndarray, shape (m,), or None
+        Of positions by themselves: 1 where the image is known to brighten along the normal, -1 where it darkens; None
+        where the image has to tell, which another edge just past the places across hides.
     least_contrast : float
         Contrast / noise below which an edge point's error is no longer linear in the noise.
     """
@@ -54,6 +57,7 @@ class CrossingLocator:
     gain: np.ndarray
     basis: np.ndarray
     level: np.ndarray
+    signs: np.ndarray | None = None
     least_contrast: float = MIN_CONTRAST
 
     def locate(self, images: np.ndarray) -> EdgePoints:
@@ -70,16 +74,20 @@ class CrossingLocator:
     def locate_each_in(self, used: np.ndarray) -> EachPoint:
         """The same of images of which only the locator's `pixels` are given, (n, P)."""
         profiles = self._profiles_of(np.ascontiguousarray(used.T))
-        profiles *= np.where(_rise(profiles) >= 0, 1.0, -1.0)[:, None]
+        profiles *= self._signs(profiles)[:, None]
         offset, valid, slope = self._offsets(*_bracket(profiles), profiles)
         return EachPoint(offset.T * self.gain, valid.T, (self.slope_to_contrast[:, None] * slope).T)
 
     def respond_each(self, clean: np.ndarray) -> tuple[EachPoint, sparse.csr_array]:
         """Such points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
         profiles = self._profiles(clean[None])
-        sign = np.where(_rise(profiles) >= 0, 1.0, -1.0)
+        sign = self._signs(profiles)
         profiles *= sign[:, None]
         return self.locate_each(clean[None]), self._response(profiles, sign[:, 0], clean.size)
+
+    def _signs(self, profiles: np.ndarray) -> np.ndarray:
+        """1 or -1 of each position by itself, (m, n) or (m, 1)."""
+        return np.where(_rise(profiles) >= 0, 1.0, -1.0) if self.signs is None else self.signs[:, None]
 
     def _offsets(self, crossing, start, found, profiles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Offsets, px, whether they are valid, and the slopes there, all (m, n)."""

@@ -24,11 +24,11 @@ def gradient_locator(optics: Optics, caliper: Caliper) -> CrossingLocator:
 
 def gradient_along(
     optics: Optics, positions: np.ndarray, places: np.ndarray, normals: np.ndarray,
-    gain: np.ndarray | float = 1.0, blur: np.ndarray | float | None = None,
+    gain: np.ndarray | float = 1.0, blur: np.ndarray | float | None = None, signs: np.ndarray | None = None,
 ) -> CrossingLocator:  # fmt: skip
     """Prepare the locator of a recorded curve given by places (m, 2) on it and unit normals (m, 2) there.
 
-    ``gain`` (m,) and ``blur`` (m,) are 1 and the optics' where not given.
+    ``gain`` (m,) and ``blur`` (m,) are 1 and the optics' where not given; ``signs`` as in `CrossingLocator`.
     """
     offsets, across, toward = places_across(places, normals, optics.window_px)
     pixels, kernel = reached(second_derivative(across, toward, optics.scale_px, optics.shape))
@@ -36,7 +36,7 @@ def gradient_along(
     nothing = np.zeros((len(places), 0)), np.zeros((0, pixels.size))
     return CrossingLocator(
         positions, offsets, pixels, kernel, np.sqrt(2 * np.pi) * total**3, gain * np.ones(len(places)),
-        *nothing,
+        *nothing, signs,
     )  # fmt: skip
 
 

@@ -204,7 +204,8 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         held(places[keep], optics), (gradient / size[:, None])[keep], size[keep],
         np.stack([along @ one, along @ two], -1)[keep], (design[:, 2] * circle.radius / (2 * speed**2))[keep],
     )  # fmt: skip
-    locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain)
+    signs = None if seen is None else np.where(seen.brightens, 1.0, -1.0)[keep]
+    locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain, signs=signs)
     return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve)
 
 

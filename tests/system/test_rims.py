@@ -83,6 +83,7 @@ def test_levels_of_the_wall_are_those_of_the_picture(bored, rendered):
     ours = np.sqrt(told.at(tool.locator.positions).squared)
     # margin: the claim, 3 %: light of the wall is sampled; without it places are more than twice as far off
     assert np.quantile(np.abs(ours / shown - 1), 0.9) < 0.03
+    assert (tool.locator.signs == 1).all()  # the upper face is brighter than the bore everywhere
     glanced = Pictures(bored, pictures.sensors, pictures.lights)
     dark = np.sqrt(rim_look.look(glanced, bored.solid.circle(name)).at(tool.locator.positions).squared)
     assert np.quantile(np.abs(dark / shown - 1), 0.9) > 0.06

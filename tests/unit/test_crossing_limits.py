@@ -5,6 +5,7 @@ import pytest
 from scipy import sparse
 from scipy.integrate import quad
 from scipy.optimize import brentq
+from scipy.special import ndtr
 
 from imaging.blurred.boundaries import Boundaries
 from imaging.blurred.segment import Segments
@@ -13,6 +14,8 @@ from imaging.features.limb_locator import limb_crossing
 from imaging.features.locator import edge_blur
 from imaging.models.bias import _zero
 from measure.estimators.crossing import STEP, CrossingLocator
+from measure.estimators.gradient import gradient_along
+from measure.features.optics import Optics
 
 
 def steps(*apart: float) -> Boundaries:
@@ -80,3 +83,19 @@ def test_a_profile_that_crosses_nowhere_is_told_from_one_that_does():
     assert each.offset[0] == pytest.approx([-1.3, 0.4 * 1.5, 0.0], abs=1e-9)
     assert each.contrast[0] == pytest.approx([4 * 2.0, 5 * 0.7, 0.0], rel=1e-9)
     assert tool.locate(image).offset[0] == pytest.approx([-1.3, 0.4 * 1.5, 0.0], abs=1e-9)
+
+
+def test_a_weak_edge_beside_a_strong_one_is_found_by_the_sign_that_is_known():
+    """The strong one stands past the places across, 4.2 px away; without the sign the middle between both is found."""
+    optics, rows, across = Optics((64, 64), blur_px=0.8), np.arange(20.0, 40.0, 2.0), np.arange(64) - 30.3
+    image = 80 * ndtr((across + 4.2) / optics.blur_px) + 14 * ndtr(across / optics.blur_px)
+    image = np.broadcast_to(image, optics.shape)
+    places, normals = np.stack([np.full(10, 30.3), rows], -1), np.tile([1.0, 0.0], (10, 1))
+    known, told = (gradient_along(optics, rows, places, normals, signs=signs) for signs in (np.ones(10), None))
+    width = np.hypot(optics.scale_px, optics.blur_px)
+
+    def second(x: float) -> float:
+        return 80 * (x + 4.2) * np.exp(-(((x + 4.2) / width) ** 2) / 2) + 14 * x * np.exp(-((x / width) ** 2) / 2)
+
+    assert known.locate_each(image[None]).offset == pytest.approx(brentq(second, -0.5, 0.5), abs=5e-3)
+    assert np.abs(told.locate_each(image[None]).offset).min() > 0.6

@@ -124,7 +124,12 @@ def test_between_places_of_a_rim(rng):
     """Linear, round the end too; good where both neighbours are, at a place itself where it is."""
     count = 7
     circle = Circle("c1", np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, 0, (), True)
-    known = RimLook(*rng.uniform(1, 5, (3, count)), np.array([True, True, False, True, True, True, False]), circle)
+    known = RimLook(
+        *rng.uniform(1, 5, (3, count)),
+        np.arange(count) > 2,
+        np.array([True, True, False, True, True, True, False]),
+        circle,
+    )
     angles = (np.arange(count) + 0.5) * 2 * np.pi / count
     here = known.at(angles)
     assert here.good.tolist() == known.good.tolist()
