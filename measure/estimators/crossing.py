@@ -17,6 +17,7 @@ from measure.features.lines import trapezoid, trend_along
 from measure.features.points import EachPoint, EdgePoints, UnitNoise
 
 STEP = 0.5  # px between the places across the edge
+_NEAR = 3  # places on each side within which an edge is brighter on one side, whatever lies beside it
 _TRUNCATE = 4  # standard deviations at which the Gaussian ends
 
 
@@ -44,7 +45,7 @@ class CrossingLocator:
         Their product is what all places of a position have in common; k may be 0.
     signs : ndarray, shape (m,), or None
         Of positions by themselves: 1 where the image is known to brighten along the normal, -1 where it darkens; None
-        where the image has to tell, which another edge just past the places across hides.
+        where the image has to tell, which it does not where another edge stands just past the places across.
     least_contrast : float
         Contrast / noise below which an edge point's error is no longer linear in the noise.
     """
@@ -86,8 +87,17 @@ class CrossingLocator:
         return self.locate_each(clean[None]), self._response(profiles, sign[:, 0], clean.size)
 
     def _signs(self, profiles: np.ndarray) -> np.ndarray:
-        """1 or -1 of each position by itself, (m, n) or (m, 1)."""
-        return np.where(_rise(profiles) >= 0, 1.0, -1.0) if self.signs is None else self.signs[:, None]
+        """1 or -1 of each position by itself, (m, n).
+
+        Signs that are known stand in an image unless it brightens the other way altogether, within the places across and
+        close to the middle: light from elsewhere than the scene says turns all of them round.
+        """
+        rise = _rise(profiles)
+        if self.signs is None:
+            return np.where(rise >= 0, 1.0, -1.0)
+        known, near = self.signs[:, None], profiles.shape[1] // 2 - _NEAR
+        other = ((known * rise).sum(0) < 0) & ((known * _rise(profiles[:, near:-near])).sum(0) < 0)
+        return known * np.where(other, -1.0, 1.0)
 
     def _offsets(self, crossing, start, found, profiles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Offsets, px, whether they are valid, and the slopes there, all (m, n)."""

@@ -99,3 +99,15 @@ def test_a_weak_edge_beside_a_strong_one_is_found_by_the_sign_that_is_known():
 
     assert known.locate_each(image[None]).offset == pytest.approx(brentq(second, -0.5, 0.5), abs=5e-3)
     assert np.abs(told.locate_each(image[None]).offset).min() > 0.6
+
+
+def test_an_image_that_is_the_other_way_round_altogether_is_believed():
+    """Light from elsewhere than the scene says: all of an edge is darker where it should be brighter."""
+    optics, rows = Optics((64, 64), blur_px=0.8), np.arange(20.0, 40.0, 2.0)
+    image = np.broadcast_to(14 * ndtr((np.arange(64) - 30.3) / optics.blur_px), optics.shape)
+    places, normals = np.stack([np.full(10, 30.3), rows], -1), np.tile([1.0, 0.0], (10, 1))
+    turned = gradient_along(optics, rows, places, normals, signs=-np.ones(10)).locate_each(image[None])
+    assert turned.valid.all()
+    assert turned.offset == pytest.approx(0.0, abs=5e-3)
+    box = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / (optics.scale_px**2 + optics.blur_px**2)  # none here
+    assert turned.contrast == pytest.approx(14.0 * box**1.5, rel=0.02)
