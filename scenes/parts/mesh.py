@@ -28,7 +28,7 @@ from scenes.parts.joined import joined
 from scenes.parts.mend import mended
 from scenes.parts.mesh_file import SAY_UNIT
 from scenes.parts.rims import Rim, boundaries, rims
-from scenes.parts.solid import Circle, Edge, Solid
+from scenes.parts.solid import Circle, Edge, Solid, summed_areas
 from scenes.units import Unit, in_unit
 
 _PLAINLY = (".stl", ".ply", ".obj")  # one body, in no unit
@@ -340,8 +340,7 @@ def _folded(triangles: np.ndarray, normals: np.ndarray, near: np.ndarray) -> boo
 
 def _normals(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit normal and area of each plane face, shape (F, 3) and (F,)."""
-    sums = np.zeros((group.max() + 1, 3))
-    np.add.at(sums, group, mesh.face_normals * mesh.area_faces[:, None])
+    sums = summed_areas(mesh.face_normals * mesh.area_faces[:, None], group, group.max() + 1)
     areas = np.linalg.norm(sums, axis=1)
     return sums / areas[:, None], areas
 

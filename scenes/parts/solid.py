@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _SLIGHT = np.cos(np.radians(6.0))  # facets of a round wall are told from its shading by the third digit
 _MANY = 2000  # vertices, of which those on the convex hull are looked for; faces at a time
 _FLAT = 1e-7  # of the object's size: how far a vertex may stand over a face of a convex solid
+_FOLDED = 1e-9  # of the area of the triangles of a face: area vectors of a face that add up to no more cancel
 
 
 @dataclass(frozen=True)
@@ -182,8 +183,7 @@ class Solid:
         """Outward unit normal of each face, shape (F, 3)."""
         corners = self.triangles
         areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
-        normal = np.zeros((len(self.faces), 3))
-        np.add.at(normal, self.triangle_faces, areas)
+        normal = summed_areas(areas, self.triangle_faces, len(self.faces))
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
     @cached_property
@@ -434,3 +434,21 @@ def assembled(first: Solid, *others: Solid) -> Solid:
 def _numbers(solid: Solid) -> np.ndarray:
     """Of the curved surfaces that faces are facets of."""
     return np.where(solid.plane, -1, 0) if solid.regions is None else solid.regions
+
+
+def summed_areas(areas: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
+    """Area vectors (count, 3) of faces of triangles with area vectors (t, 3) on faces (t,).
+
+    A sliver that is folded back onto itself has none, so the one of its largest triangle stands for it.
+
+    Examples
+    --------
+    >>> summed_areas(np.array([[0, 0, 2.0], [0, 0, 1.0], [0, 1.0, 0], [0, -1.0, 0]]), np.array([0, 0, 1, 1]), 2).tolist()
+    [[0.0, 0.0, 3.0], [0.0, 1.0, 0.0]]
+    """
+    found, sizes = np.zeros((count, 3)), np.linalg.norm(areas, axis=1)
+    np.add.at(found, faces, areas)
+    folded = np.linalg.norm(found, axis=1) <= _FOLDED * np.bincount(faces, sizes, count)
+    for face in np.flatnonzero(folded):
+        found[face] = areas[np.argmax(np.where(faces == face, sizes, -1.0))]
+    return found

@@ -2,6 +2,7 @@
 
 import pickle
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -169,3 +170,18 @@ def test_half_hidden_edge():
     assert stop == 1
     assert 1.5 + start * 8.5 == pytest.approx(shadow, rel=1e-9)
     assert turned(solid, solid.edge("e10"), np.array([50.0, 2.5, -3.0])).tolist() == [False, False]
+
+
+def test_a_sliver_folded_back_onto_itself_has_a_normal():
+    """As a mesh from a CAD system had one: its triangles cancel, and the normal was not a number."""
+    box = mesh.solid(trimesh.creation.box((2, 2, 2)))
+    sliver = np.array([[1.0, 1, 1], [1, -1, 1], [1, 0, 1.0001]])
+    folded = replace(
+        box,
+        faces=(*box.faces, (0, 1)),
+        triangles=np.concatenate([box.triangles, [sliver, sliver[::-1]]]),
+        triangle_faces=np.concatenate([box.triangle_faces, [6, 6]]),
+        holes=(*box.holes, ()),
+    )
+    assert np.abs(folded.normals[6]) == pytest.approx([1, 0, 0])
+    assert np.array_equal(folded.normals[:6], box.normals)
