@@ -25,6 +25,11 @@ _BESIDE = np.linspace(-2.5, 2.5, 11)  # standard deviations, tangentially: facet
 _SHARES = np.exp(-(_BESIDE**2) / 2) / np.exp(-(_BESIDE**2) / 2).sum()
 _MIDDLE = len(_BESIDE) // 2
 _CELL, _CELLS = 0.2, 24  # standard deviations that a ray stands for, and how many on each side
+_MIDDLES = _CELL * (np.arange(-_CELLS, _CELLS) + 0.5)
+_SPREAD = 0.2  # of lines beside each other, towards a small rim's middle: it is no less
+_TURN = 1e-3  # part of a rim's turn that its bend is told by
+_MOST_BEYOND = 64  # lines beyond each end of an arc
+_APART, _DIGITS = 0.6, 6  # standard deviations between lines around the rim at most, where not more than 11 a place
 _SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
 _STEPS = 8  # of Newton's method
 _FARTHEST = 0.2  # px that a crossing may be moved: levels are known to a few percent, and so is the move
@@ -123,12 +128,17 @@ def _steady(shift: np.ndarray, contrast: np.ndarray) -> np.ndarray:
 
 def _outline(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Normals (n, 2), the smoothed edge's standard deviation (n,), ideal px, and the outline (n, J) in units of it."""
+    places, normals, width = _normals(pictures, circle, angle)
+    where = outline_beside(pictures, circle, places, normals, width[:, None] * _BESIDE)
+    return normals, width, where / width[:, None]
+
+
+def _normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Image points and normals (n, 2) and the smoothed edge's standard deviation (n,) there, ideal px."""
     scene = pictures.scene
     places, normals = _places(pictures, circle, angle), outward_normals(pictures, circle, angle)[0]
     stretch = np.sqrt(np.abs(np.linalg.det(lens_jacobian(places + image_centre(scene.camera), scene.camera))))
-    width = np.hypot(scene.locator.scale_px, edge_blur(scene.camera.blur_px)) / stretch
-    where = outline_beside(pictures, circle, places, normals, width[:, None] * _BESIDE)
-    return normals, width, where / width[:, None]
+    return places, normals, np.hypot(scene.locator.scale_px, edge_blur(scene.camera.blur_px)) / stretch
 
 
 def _places(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
@@ -140,33 +150,89 @@ def _places(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray
 def _levels(pictures: Pictures, circle: Circle, angle, normals, width, where) -> np.ndarray:
     """Mean signal of the cells (n, J, 2 cells) on both sides of the outline, from the inside outwards.
 
+    Lines beside a place along its tangent lie between those of places around the rim, which are looked at once.
+    """
+    around, here = _lines(pictures, circle, angle, width)
+    lines = _along_normals(pictures, circle, around)
+    spread = 1 + _bend(pictures, circle, angle)[:, None] * width[:, None] * _MIDDLES  # of lines, away from the rim
+    beside = (width[:, None] * _BESIDE)[..., None] / np.maximum(spread, _SPREAD)[:, None]
+    at = _between(_places(pictures, circle, around), here, normals, beside, circle.ends is None)
+    first, cell = np.floor(at).astype(int), np.arange(_MIDDLES.size)
+    share, then = at - first, first + 1
+    if circle.ends is not None:
+        first, then = (np.clip(each, 0, len(lines) - 1) for each in (first, then))
+    left, right = lines[first % len(lines), cell], lines[then % len(lines), cell]
+    return np.where(share == 0, left, (1 - share) * left + share * right)
+
+
+def _bend(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Curvature of the rim's image (n,), 1 / ideal px: its normals turn so much a px along it."""
+    step = _TURN * circle.turn
+    ahead, back = (angle + step, angle - step)
+    one, other = (outward_normals(pictures, circle, each)[0] for each in (ahead, back))
+    turn = np.arcsin(np.clip(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0], -1, 1))
+    speed = outward_normals(pictures, circle, angle)[2]
+    return np.abs(turn) / (2 * step * speed)
+
+
+def _lines(pictures: Pictures, circle: Circle, angle: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Angles (m,) of the lines around a rim, beyond an arc's ends too, and which of them are those of its places (n,).
+
+    So many for a place that they are near each other, an odd number: one of them goes through it.
+    """
+    steps = np.diff(_places(pictures, circle, angle), axis=0)
+    apart = np.nan_to_num(np.linalg.norm(steps, axis=-1) / width[1:], nan=_APART)
+    times = 1 + 2 * int(np.clip(np.ceil((apart.max() / _APART - 1) / 2), 0, _MIDDLE))
+    beyond = 0 if circle.ends is None else int(min(np.ceil(times * _BESIDE[-1] / apart.min()), _MOST_BEYOND))
+    count = angle.size * times
+    around = circle.begin + circle.turn * (np.arange(-beyond, count + beyond) + 0.5) / count
+    return around, beyond + times // 2 + times * np.arange(angle.size)
+
+
+def _between(rim: np.ndarray, here: np.ndarray, normals: np.ndarray, beside: np.ndarray, closed: bool) -> np.ndarray:
+    """Which of the lines at places (m, 2) of a rim lie ``beside`` (n, J, C) some of them along the tangent, ideal px.
+
+    Numbers between too, (n, J, C); of a closed rim also below 0 and above m.
+    """
+    onward = np.diff(rim, axis=0, append=rim[:1])
+    length = np.concatenate([[0.0], np.cumsum(np.nan_to_num(np.linalg.norm(onward, axis=-1)))])
+    tangents = np.stack([-normals[:, 1], normals[:, 0]], -1)
+    ahead = np.sign(np.einsum("ni,ni->n", tangents, onward[np.minimum(here, len(rim) - 2)]))
+    numbers, whole = np.arange(len(rim)), length[-1]
+    if closed:
+        numbers = np.concatenate([numbers - len(rim), numbers, numbers + len(rim)])
+        known = np.concatenate([length[:-1] - whole, length[:-1], length[:-1] + whole])
+    else:
+        known = length[:-1]
+    asked = np.expand_dims(length[here], (1, 2)) + np.expand_dims(ahead, (1, 2)) * beside
+    return np.round(np.interp(np.nan_to_num(asked), known, numbers), _DIGITS)
+
+
+def _along_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
+    """Mean signal of the cells (n, 2 cells) along the normals of places of a rim, from the inside outwards.
+
     One ray tells a cell, but several those beside the outline and those that differ from a neighbour: a wall may be
     seen narrower than a cell.
     """
-    places, tangents = _places(pictures, circle, angle), np.stack([-normals[:, 1], normals[:, 0]], -1)
-    lines = places[:, None] + width[:, None, None] * (
-        _BESIDE[:, None] * tangents[:, None] + where[..., None] * normals[:, None]
-    )
+    places, normals, width = _normals(pictures, circle, angle)
 
-    def seen(which: tuple[np.ndarray, ...], cells: np.ndarray) -> np.ndarray:
-        place, line = which
-        points = lines[place, line] + (width[place] * cells)[:, None] * normals[place]
+    def seen(line: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        points = places[line] + (width[line] * cells)[:, None] * normals[line]
         levels = _looked_at(pictures, points)
         return np.where(np.isfinite(points).all(-1), levels, np.nan)
 
-    middles = _CELL * (np.arange(-_CELLS, _CELLS) + 0.5)
-    place, line, cell = np.indices((*where.shape, middles.size)).reshape(3, -1)
-    levels = seen((place, line), middles[cell]).reshape(*where.shape, -1)
+    line, cell = np.indices((len(places), _MIDDLES.size)).reshape(2, -1)
+    levels = seen(line, _MIDDLES[cell]).reshape(len(places), -1)
     uneven = _uneven(levels)
-    place, line, cell = (np.repeat(v, _SHARP) for v in np.nonzero(uneven))
+    line, cell = (np.repeat(v, _SHARP) for v in np.nonzero(uneven))
     offsets = _CELL * ((np.arange(_SHARP) + 0.5) / _SHARP - 0.5)
-    several = seen((place, line), middles[cell] + np.tile(offsets, uneven.sum()))
+    several = seen(line, _MIDDLES[cell] + np.tile(offsets, uneven.sum()))
     levels[uneven] = several.reshape(-1, _SHARP).mean(1)
     return levels
 
 
 def _uneven(levels: np.ndarray) -> np.ndarray:
-    """Cells beside the outline, and such as differ from a neighbour on their side of it, bool (n, J, 2 cells)."""
+    """Cells beside the outline, and such as differ from a neighbour on their side of it, bool (n, 2 cells)."""
     found = np.zeros(levels.shape, bool)
     found[..., [_CELLS - 1, _CELLS]] = True
     limit = _EVEN * np.nanmax(levels, initial=0.0)

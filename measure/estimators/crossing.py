@@ -89,8 +89,8 @@ class CrossingLocator:
     def _signs(self, profiles: np.ndarray) -> np.ndarray:
         """1 or -1 of each position by itself, (m, n).
 
-        Signs that are known stand in an image unless it brightens the other way altogether, within the places across and
-        close to the middle: light from elsewhere than the scene says turns all of them round.
+        Signs that are known stand in an image unless all of it brightens the other way, between the ends and close to
+        the middle: light from elsewhere than the scene says turns all of them round.
         """
         rise = _rise(profiles)
         if self.signs is None:

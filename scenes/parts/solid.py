@@ -443,7 +443,8 @@ def summed_areas(areas: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray
 
     Examples
     --------
-    >>> summed_areas(np.array([[0, 0, 2.0], [0, 0, 1.0], [0, 1.0, 0], [0, -1.0, 0]]), np.array([0, 0, 1, 1]), 2).tolist()
+    >>> areas = np.array([[0, 0, 2.0], [0, 0, 1.0], [0, 1.0, 0], [0, -1.0, 0]])
+    >>> summed_areas(areas, np.array([0, 0, 1, 1]), 2).tolist()
     [[0.0, 0.0, 3.0], [0.0, 1.0, 0.0]]
     """
     found, sizes = np.zeros((count, 3)), np.linalg.norm(areas, axis=1)
