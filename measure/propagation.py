@@ -12,6 +12,7 @@ from scipy import sparse
 from imaging.models.bias import MOST
 from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
+from measure.estimators.separate import SeparateEstimator
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response, tells_errors
@@ -102,8 +103,9 @@ def propagate(
 ) -> Propagated:
     """Propagate pixel noise through lines, circles and corners to all measurands.
 
-    On the noise-free image each line is linear in small noise, and so is all that follows; of circles drawn noise is
-    asked whether it is, and what needs one that is not has no value: ``ill_conditioned``. With g the derivative of a
+    On the noise-free image each line is linear in small noise, and so is all that follows; of circles, and of lines
+    beside which another edge runs for a part, drawn noise is asked whether it is, and what needs one that is not has no
+    value: ``ill_conditioned``. With g the derivative of a
     value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
     share pixels, and so their correlation is in g.
 
@@ -186,7 +188,8 @@ def _of_lines(
         rows[np.repeat(~counted, 2)] = np.nan
         return sparse.csr_array(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
-        near = tool.respond_within(clean)
+        is_separate = isinstance(tool, SeparateEstimator)
+        near = tool.respond_within(clean, asked=True) if is_separate else tool.respond_within(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
     near[np.repeat(~measured, 2)] = np.nan
     if not tool.pixels.size:
