@@ -122,8 +122,9 @@ class Measurand(Model):
 
     Geometric tolerances, whose ``tolerance`` is the zone's width or diameter: ``true_position`` of a corner or centre
     in a datum system of two features, an edge and an edge or a point, or a point and a point or an edge, as NAME.x and
-    NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, as NAME.x and NAME.y; ``symmetry`` of a line
-    or a point about a line; ``parallelism`` and ``perpendicularity`` of an edge to a datum edge.
+    NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, the middle of a slot or the centre of a
+    pattern among them, as NAME.x and NAME.y; ``symmetry`` of a line or a point about a line; ``parallelism`` and
+    ``perpendicularity`` of an edge to a datum edge.
     """
 
     name: Title

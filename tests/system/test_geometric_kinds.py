@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import measure
 import planner
@@ -14,7 +15,7 @@ from tests import toleranced
 from tests.commands import ice
 from tests.proofs import kinds
 from validation.budgets import capability
-from validation.inspection import expanded
+from validation.inspection import expanded, inspect
 from validation.zones import measured_zones
 
 pytestmark = pytest.mark.render
@@ -129,6 +130,36 @@ def test_all_kinds_scatter_as_propagated(tmp_path):
     assert not any(row.holds(len(rows), 3.0) for row in rows)  # negative control
     assert len(zones) == 6
     assert all(zone.p > 0.01 / len(zones) > zone.p_normal for zone in zones)
+
+
+def test_centres_of_slots_and_patterns_are_measured_and_decided(tmp_path):
+    """Their values the plate's within 5 standard uncertainties, as scattered as propagated; budgeted and decided as
+    those of corners and bores."""
+    scene = toleranced.scene(tmp_path, ("slot",), 40, **_TINY)
+    slot, pattern = {"midpoint": [{"circle": "c8"}, {"circle": "c10"}]}, {"pitch_circle": ["c2", "c6", "c4"]}
+    rows = (
+        ("place", "true_position", [slot, {"circle": "c2"}, {"circle": "c6"}]),
+        ("apart", "distance", [slot, pattern]),
+    )
+    scene = scene.with_(
+        measurands=[{"name": name, "kind": kind, "features": each, "tolerance": 0.3} for name, kind, each in rows]
+    )
+    picture = scenes.Picture.of(scene, (20, 300), (30, 350))
+    clean = render.image(picture, quality=render.Quality(seed=3))
+    told = measure.propagate(clean, picture).measurands
+    found = measure.measure(render.expose(clean, scene.noise, np.random.default_rng(4), 120), picture)
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 119) / 119
+    ratios = found.value.var(0, ddof=1) / np.diag(told.covariance)
+    assert ((low < ratios) & (ratios < high)).all(), ratios  # margin: chance, an interval of 99.9 %
+    assert not ((low < ratios / 2) & (ratios / 2 < high)).any()
+    one = measure.measure(clean, picture)
+    made, known = inspect(one), planner.budget(picture)
+    assert [row.requirement.name for row in made.rows] == ["place.x", "place.y", "apart"]
+    assert made.rows[2].decision == made.decision == "pass"
+    (zone,) = measured_zones(one, expanded(one))
+    assert (zone.zone.name, zone.decision) == ("place", "pass")
+    assert [each.name for each in known.measurands] == [row.requirement.name for row in made.rows]
+    assert np.abs(one.value - np.array([22.0, 10.0, 18.0 - toleranced.CENTRE[1]])).max() < 0.03  # a tenth of the zone
 
 
 def test_a_block_quickly(task1):
