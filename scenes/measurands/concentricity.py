@@ -26,6 +26,7 @@ class Concentricity(MeasurandKind):
     parts = "x", "y"
     nominals = 0
     zone = 2.0
+    takes_material = True
 
     def takes(self, features) -> bool:
         """Circles, middles of two and centres of patterns."""

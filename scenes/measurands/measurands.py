@@ -139,6 +139,9 @@ class Measurand(Model):
     """How far it may lie from it, the scene's unit or degrees: one number, or plus and minus; a zone's size."""
     weight: Positive = 1.0
     """In the planner's weighted sum."""
+    maximum_material: Title | None = None
+    """Of a zone that grows as the feature departs from its maximum material size (ISO 2692): the name of the diameter,
+    or of the slot's width (NAME.width), that is this size; its own tolerance says what is most."""
 
     @model_validator(mode="after")
     def _complete(self) -> Measurand:
@@ -153,6 +156,9 @@ class Measurand(Model):
             number = ("left out", "one number", "two numbers")[kind.nominals]
             raise ValueError(f"nominal must be {number} for kind {self.kind}, got {self.nominal}")
         kind.check_values(self)
+        if self.maximum_material is not None and not (kind.takes_material and self.tolerance is not None):
+            without = "without tolerance" if kind.takes_material else f"for kind {self.kind}"
+            raise ValueError(f"maximum_material must be left out {without}, got {self.maximum_material!r}")
         return self
 
     @property

@@ -16,6 +16,7 @@ from tests.commands import ice
 from tests.proofs import kinds
 from validation.budgets import capability
 from validation.inspection import expanded, inspect
+from validation.report.inspection_files import About, records
 from validation.zones import measured_zones
 
 pytestmark = pytest.mark.render
@@ -160,6 +161,35 @@ def test_centres_of_slots_and_patterns_are_measured_and_decided(tmp_path):
     assert (zone.zone.name, zone.decision) == ("place", "pass")
     assert [each.name for each in known.measurands] == [row.requirement.name for row in made.rows]
     assert np.abs(one.value - np.array([22.0, 10.0, 18.0 - toleranced.CENTRE[1]])).max() < 0.03  # a tenth of the zone
+
+
+def test_a_zone_that_grows_with_its_bore(tmp_path):
+    """A true place 0.25 mm beside the bore's, as a diameter: beyond 0.2, but its diameter of 8 is 0.1 above the least.
+
+    Decided, on the inspection's page, in its CSV and in QIF as in the command's JSON."""
+    bores = [{"circle": name} for name in ("c4", "c2", "c6")]
+    rows = [
+        {"name": "bore", "kind": "diameter", "features": bores[:1], "tolerance": 0.1},
+        {"name": "place", "kind": "true_position", "features": bores, "tolerance": 0.2, "nominal": [22.1, 24.075]},
+    ]
+    plate = toleranced.scene(tmp_path, ("bolts",), 40, **_TINY).with_(measurands=rows)
+    picture = scenes.Picture.of(plate, (20, 300), (30, 350))
+    clean = render.image(picture, quality=render.Quality(seed=3))
+    rows[1]["maximum_material"] = "bore"
+    grown = picture.with_scene(plate.with_(measurands=rows))
+    found = [inspect(measure.measure(clean, each)) for each in (picture, grown)]
+    assert [each.zones[0].decision for each in found] == [each.decision for each in found] == ["fail", "pass"]
+    plain, told = (each.zones[0].facts for each in found)
+    assert told["value"] == pytest.approx(plain["value"], rel=1e-12)
+    assert told["maximum_material"]["bonus"] == pytest.approx(0.1, abs=0.02)  # a fifth of it: by the rim's pixels
+    assert told["size"] == pytest.approx(0.2 + told["maximum_material"]["bonus"])
+    assert plain["maximum_material"] is None
+    last = records(found[1], About("SN1", ("picture.png",)))[-1]
+    assert (last["upper"], last["decision"]) == (told["size"], "pass")
+    size = found[1].zones[0].size
+    alone = size.covariance[:2, :2]
+    assert size.covariance[2, 2] > 0
+    assert found[0].zones[0].size.covariance == pytest.approx(alone)
 
 
 def test_a_block_quickly(task1):
