@@ -24,6 +24,7 @@ _SURFACE = {"flatness", "cylindricity", "profile of a surface", "circular runout
 _INSIDE = "it needs the form of a whole surface, which edges in a picture do not show"
 _NOT_YET = "not yet among the kinds of measurand"
 _NO_ZONE = "the file gives no size of the zone"
+_ZERO = "its zone is 0 at maximum material: write it with tolerance 0 and the name of its size (maximum_material)"
 _NO_FACES = "the file says of no face what it is of"
 _AXIS = "the direction of an axis shows in no one plane"
 _NO_DATUM = "the file says of no face what datum {} is"
@@ -68,7 +69,7 @@ def toleranced(known: Faces, each: Characteristic, datums: dict[str, tuple[int, 
     if each.kind not in _KINDS:
         return _INSIDE if each.kind in _SURFACE else _NOT_YET
     if not each.zone:
-        return _NO_ZONE
+        return _ZERO if each.zone == 0 and "M" in each.modifiers else _NO_ZONE
     lost = [letter for letter in _letters(each) if not known.of(datums.get(letter, ()))]
     if not each.faces or not known.of(each.faces) or lost:
         return _NO_DATUM.format(lost[0]) if lost else _NO_FACES

@@ -141,6 +141,7 @@ def test_rims_about_one_axis(tmp_path):
         ("position", [4.0], (TOP,), {"is_round": True}, "its datums fix no place in the plane"),
         ("position", [4.0], (TOP, FRONT, None), {"is_round": True}, "of no face what datum C is"),
         ("position", [4.0], (TOP, FRONT, LEFT), {"zone": None}, "gives no size of the zone"),
+        ("position", [4.0], (TOP, FRONT, LEFT), {"zone": 0.0, "modifiers": ("M",)}, "is 0 at maximum material"),
         ("perpendicularity", [4.0], (TOP,), {"is_round": True}, "the direction of an axis"),
         ("perpendicularity", [FRONT], (), {}, "no edge or circle of it lies in one plane"),
         ("flatness", [TOP], (), {}, "form of a whole surface"),

@@ -129,6 +129,19 @@ def test_what_zones_grow_with(plate):
     assert Material("shaft", 8.1, -1.0).departure(8.05) == pytest.approx(0.05)
 
 
+def test_a_plan_takes_a_feature_in_the_middle_of_its_limits(plate):
+    """Half of the zone's 0.2 and of the 0.075, 0.1 that the middle of the size's limits is from the least; of a zone
+    of 0 at maximum material the latter alone."""
+    limits = {quantity.name: quantity.tolerance and quantity.tolerance.half for quantity in plate.quantities}
+    assert (limits["place.x"], limits["place.y"], limits["middle"]) == pytest.approx((0.1375, 0.1375, 0.15))
+    assert (limits["bore"], limits["slot.width"]) == pytest.approx((0.075, 0.1))
+    none = plate.with_(measurands=[ROWS[0], ROWS[1] | {"tolerance": 0}])
+    assert none.quantities[1].tolerance.half == pytest.approx(0.0375)
+    assert none.zones[0].size == 0
+    with pytest.raises(InvalidInput, match="tolerance must be greater than 0 above or below, got 0 for both"):
+        plate.with_(measurands=[{**ROWS[0], "tolerance": 0}])
+
+
 def test_a_shaft_has_most_material_where_it_is_largest():
     """The bundled shaft's rims look away from its axis."""
     shaft = scenes.load("shaft")
