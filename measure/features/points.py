@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-DECIDED = 0.5  # of an edge's points must be certain: else noise decides which of two edges is found
+DECIDED = 0.25  # of an edge's points must be certain (of a faint one alone half are): else noise decides between two
 
 
 class EdgePoints(NamedTuple):

@@ -109,6 +109,16 @@ def test_two_edges_side_by_side_are_no_edge(apart, expected):
     assert estimator().estimate(clean[None], OPTICS.noise_variance).state[0, 0] == expected
 
 
+@pytest.mark.parametrize("contrast", [5.3, 7.0, 12.0])
+def test_a_faint_edge_is_no_pair(contrast):
+    """Of a contrast that is just enough, over the noise: found in all images, as scattered as told."""
+    clean = 40 + contrast * np.sqrt(OPTICS.noise_variance) * border(AWAY)
+    _, _, states = errors(clean)
+    assert np.isin(states, (status.OK, status.LOW_CONTRAST)).all()
+    assert (states[-1], tells_errors(clean)) == (status.OK, True)
+    assert untold(clean) < MOST
+
+
 @pytest.mark.parametrize("is_whole", [True, False])
 def test_how_much_points_count_is_derived(is_whole, monkeypatch):
     """Against central differences of the line through them; without it the derivatives are others."""
