@@ -12,6 +12,8 @@ from scipy import sparse
 from imaging.models.bias import MOST
 from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
+from measure.estimators.kinds import ESTIMATORS
+from measure.estimators.separate import SeparateEstimator
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response, tells_errors
@@ -102,8 +104,9 @@ def propagate(
 ) -> Propagated:
     """Propagate pixel noise through lines, circles and corners to all measurands.
 
-    On the noise-free image each line is linear in small noise, and so is all that follows; of circles drawn noise is
-    asked whether it is, and what needs one that is not has no value: ``ill_conditioned``. With g the derivative of a
+    On the noise-free image each line is linear in small noise, and so is all that follows; of circles, and of lines
+    beside which another edge runs for a part, drawn noise is asked whether it is, and what needs one that is not has no
+    value: ``ill_conditioned``. With g the derivative of a
     value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
     share pixels, and so their correlation is in g.
 
@@ -186,13 +189,22 @@ def _of_lines(
         rows[np.repeat(~counted, 2)] = np.nan
         return sparse.csr_array(rows)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
-        near = tool.respond_within(clean)
+        if isinstance(tool, SeparateEstimator):
+            near = tool.respond_within(clean, asked=_is_in_place(found, layout, estimator))
+        else:
+            near = tool.respond_within(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
     near[np.repeat(~measured, 2)] = np.nan
     if not tool.pixels.size:
         return _none(len(near), clean.size)
     rows = sparse.csr_array(near)
     return sparse.csr_array((rows.data, tool.pixels[rows.indices], rows.indptr), (len(near), clean.size))
+
+
+def _is_in_place(found: MeasuredFeatures, layout: Layout, estimator: str) -> bool:
+    """Whether the lines are measured from where they are expected: else drawn noise there says nothing of them."""
+    away = np.einsum("ei,eki->ek", found.shape.normals[0], layout.ends - found.shape.points[0][:, None])
+    return bool((np.abs(away) <= ESTIMATORS[estimator].capture_px).all())
 
 
 def _of_measured(gradient: np.ndarray, state: list[str]) -> np.ndarray:

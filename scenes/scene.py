@@ -6,6 +6,7 @@ brightness is in grey levels.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Annotated, Any, Literal
 
@@ -27,6 +28,7 @@ from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
 from scenes.measurands.features import Basic, Corner, Wall, check_feature, place_of
 from scenes.measurands.kinds import MEASURANDS
+from scenes.measurands.material import material_of
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
 from scenes.measurands.zone import Zone
 from scenes.model import FileName, Model, Title, rebuild
@@ -190,7 +192,15 @@ class Scene(Model):
     @property
     def zones(self) -> tuple[Zone, ...]:
         """Of the geometric tolerances among the measurands."""
-        return tuple(zone for each in self.measurands if (zone := each.zone) is not None)
+        found = ((i, each, each.zone) for i, each in enumerate(self.measurands))
+        return tuple(self._grown(f"measurands[{i}]", each, zone) for i, each, zone in found if zone is not None)
+
+    def _grown(self, key: str, each: Measurand, zone: Zone) -> Zone:
+        """A zone with what it grows with, where it does."""
+        if each.maximum_material is None:
+            return zone
+        quantities = quantities_of(self.task, self.measurands)
+        return replace(zone, material=material_of(self.solid, key, each, quantities))
 
     def unit_of(self, quantity: Quantity) -> str:
         """Of a number in the object: the scene's unit of length, or degrees."""
@@ -400,6 +410,7 @@ class Scene(Model):
                 check_feature(whole, f"measurands[{i}].features[{k}]", feature)
             for quantity in measurand.quantities:
                 check_quantity(self.solid, f"measurands[{i}].features", quantity)
+        _ = self.zones  # what some grow with
 
     def _check_task(self, task: Task) -> None:
         for end, feature in zip(("start", "end"), task.corners, strict=False):

@@ -25,12 +25,12 @@ _SLOT = {"centre_line": ["e10", "e12"]}
 _PLATE = {"centre_line": ["e5", "e8"]}
 _CORNER = {"vertex": "v8", "edges": ["e8", "e15"]}
 _BORES = np.array([(x, y) for x, y, _ in parts.TOLERANCED])
-_CENTRE = np.linalg.solve(2 * (_BORES[1:] - _BORES[0]), (_BORES[1:] ** 2).sum(1) - (_BORES[0] ** 2).sum())
+CENTRE = np.linalg.solve(2 * (_BORES[1:] - _BORES[0]), (_BORES[1:] ** 2).sum(1) - (_BORES[0] ** 2).sum())
 
 ASKED: tuple[tuple[str, str, list, float | None, dict[str, float]], ...] = (
     ("round end", "radius", [_ENDS[0]], 0.05, {"round end": 3.0}),
     ("slot", "slot", [*_ENDS], 0.1, {"slot.width": 6.0, "slot.length": 20.0}),
-    ("bolts", "pitch_circle", [_B, _C, _D], 0.1, {"bolts": 2 * np.linalg.norm(_BORES[0] - _CENTRE)}),
+    ("bolts", "pitch_circle", [_B, _C, _D], 0.1, {"bolts": 2 * np.linalg.norm(_BORES[0] - CENTRE)}),
     ("in edges", "true_position", [_D, _FRONT, _LEFT], 0.2, {"in edges.x": 30.0, "in edges.y": 32.0}),
     ("from a bore", "true_position", [_D, _FRONT, _B], 0.2, {"from a bore.x": 22.0, "from a bore.y": 32.0}),
     ("about a bore", "true_position", [_D, _B, _FRONT], 0.2, {"about a bore.x": 22.0, "about a bore.y": 24.0}),
@@ -45,7 +45,7 @@ ASKED: tuple[tuple[str, str, list, float | None, dict[str, float]], ...] = (
     ("to the crossing", "distance", [_D, {"crossing": ["e5", "e4"]}], 0.1, {"to the crossing": np.hypot(30, 32)}),
     ("to the foot", "distance", [_B, {"foot": _D, "on": "e5"}], 0.1, {"to the foot": np.hypot(22, 8)}),
     ("from the line", "offset", [_D, {"through": [_B, _C]}], 0.1, {"from the line": 24.0}),
-    ("to the pattern", "offset", [{"pitch_circle": ["c2", "c6", "c4"]}, _FRONT], 0.1, {"to the pattern": _CENTRE[1]}),
+    ("to the pattern", "offset", [{"pitch_circle": ["c2", "c6", "c4"]}, _FRONT], 0.1, {"to the pattern": CENTRE[1]}),
     ("slot to bores", "width", [{"centre_line": ["e4", "e15"]}, {"square_at": [_B, _C]}], 0.2, {"slot to bores": 22.0}),
     ("wall", "width", [_SLOT, _BACK], 0.1, {"wall": 22.0}),
     ("lines", "angle", [{"through": [_B, _D]}, _FRONT], 0.1, {"lines": np.degrees(np.arctan2(24, 22))}),

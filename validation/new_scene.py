@@ -18,6 +18,7 @@ from scenes.files.door import read_bytes
 from scenes.load import from_document
 from scenes.measurands.between import AnyFeature
 from scenes.measurands.drawn import Drawn, drawn
+from scenes.measurands.drawn_material import asks_for_material, with_material
 from scenes.measurands.proposed import proposed
 from scenes.parts import limits, pmi, step
 from scenes.parts.mesh_file import SAY_UNIT
@@ -151,6 +152,7 @@ def written(
     if candidates:
         look = first_look(scene, candidates, report, **({"most": len(options)} if options else {}))
         look = _each_once(look, asked) if options else look
+        look = replace(look, measurands=with_material(scene.solid, look.measurands, asked))
     text += _NOTHING if look is None else _measured(look, asked)
     made = _loaded(text, path, record)
     path.write_text(text, encoding="utf-8")
@@ -230,7 +232,8 @@ def _text(record: Step | Mesh, path: Path, units: str, low: np.ndarray, high: np
 
 def _measured(look: FirstLook, asked: tuple[Drawn, ...]) -> str:
     """What is measured, and where; what the file asks for and is not seen, commented out."""
-    measurands = "\n".join(map(_measurand, look.measurands))
+    material = asks_for_material(asked)
+    measurands = "\n".join(_measurand(each, each.name in material) for each in look.measurands)
     poses = ([float(x) for x in pose] for pose in (look.sensor, look.light))
     whose = _DRAWN if any(each.candidates for each in asked) else _PROPOSED
     text = _ASKED.format(whose=whose, measurands=measurands, **dict(zip(("sensor", "light"), poses, strict=True)))
@@ -242,15 +245,22 @@ def _measured(look: FirstLook, asked: tuple[Drawn, ...]) -> str:
     return text + "\n" + _UNSEEN.format(measurands="\n".join(f"# {line}".rstrip() for line in lines))
 
 
-def _measurand(each: Measurand) -> str:
+def _measurand(each: Measurand, is_growing: bool = False) -> str:
+    """A measurand as a scene has it; whether the file says that its zone grows with its size."""
     features = ", ".join(map(_inline, each.features))
     limits = each.tolerance
     tolerance = limits.plus if limits.plus == limits.minus else f"{{ plus = {limits.plus}, minus = {limits.minus} }}"
     nominal = "" if each.nominal is None else f"nominal = {_value(each.nominal)}\n"
     return (
         f"[[measurands]]\nname = {json.dumps(each.name)}\nkind = {json.dumps(each.kind)}\n"
-        f"features = [{features}]\n{nominal}tolerance = {tolerance}\n"
+        f"features = [{features}]\n{nominal}tolerance = {tolerance}\n{_material(each, is_growing)}"
     )
+
+
+def _material(each: Measurand, is_growing: bool) -> str:
+    if each.maximum_material is not None:
+        return f"maximum_material = {json.dumps(each.maximum_material)} # whose size lets the zone grow (ISO 2692)\n"
+    return "# at maximum material: its diameter with limits is not measured here\n" * is_growing
 
 
 def _inline(feature: AnyFeature) -> str:

@@ -10,6 +10,7 @@ from uncertainties import covariance_matrix
 
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.conformity import Decision
+from planner.uncertainty.material import MaterialSize
 from planner.uncertainty.zones import ZoneSize
 from scenes import status
 from scenes.measurands.zone import Zone
@@ -42,17 +43,37 @@ class MeasuredZone:
         return None if self.zone.size is None else self.size.decide(self.zone.size, status=self.status)
 
     @property
+    def bonus(self) -> float:
+        """By how much the zone is larger than the drawing's size, for the feature is not at maximum material."""
+        return self.size.departure if isinstance(self.size, MaterialSize) else 0.0
+
+    @property
     def facts(self) -> dict[str, Any]:
         """For JSON and tables; None where nothing is measured."""
-        known, size = self.size.is_known, self.size
-        low, high = size.interval() if known else (None, None)
+        known, size, bonus = self.size.is_known, self.size, self.bonus
+        low, high = (each + bonus for each in size.interval()) if known else (None, None)
         return {
             "name": self.zone.name, "kind": self.zone.kind, "parts": list(self.zone.parts), "unit": self.unit,
-            "value": size.value if known else None, "mean": size.mean if known else None,
+            "value": size.value + bonus if known else None, "mean": size.mean + bonus if known else None,
             "u": size.u if known else None, "low": low, "high": high,
-            "at_most": size.quantile(0.95) if known else None, "size": self.zone.size, "decision": self.decision,
-            "status": self.status,
+            "at_most": size.quantile(0.95) + bonus if known else None,
+            "size": self._allowed, "decision": self.decision, "status": self.status,
+            "maximum_material": self._material,
         }  # fmt: skip
+
+    @property
+    def _allowed(self) -> float | None:
+        """The drawing's size, with the bonus where there is one; None without."""
+        return None if self.zone.size is None else self.zone.size + (self.bonus if self.size.is_known else 0.0)
+
+    @property
+    def _material(self) -> dict[str, Any] | None:
+        """With what its size has grown, and by how much."""
+        material = self.zone.material
+        if material is None:
+            return None
+        bonus = self.bonus if np.isfinite(self.bonus) else None
+        return {"of": material.of, "limit": material.limit, "bonus": bonus, "drawn": self.zone.size}
 
 
 def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tuple[MeasuredZone, ...]:
@@ -63,12 +84,21 @@ def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tu
     names, made = list(found.names), []
     for zone in found.picture.scene.zones:
         if zone.is_joint:
-            rows = [names.index(name) for name in zone.parts]
-            covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.parts)
-            size = ZoneSize((found.value - found.nominal)[rows], covariance, zone.factor)
+            rows = [names.index(name) for name in zone.numbers]
+            covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.numbers)
+            size = _size(zone, (found.value - found.nominal)[rows], found.value[rows[-1]], covariance)
             state = status.worst(*(str(found.status[k]) for k in rows))
             made.append(MeasuredZone(zone, size, found.units[rows[0]], state))
     return tuple(made)
+
+
+def _size(zone: Zone, off: np.ndarray, last: float, covariance: np.ndarray) -> ZoneSize:
+    """Of deviations of a zone's numbers; the last one, where it grows, is the value of the size with which it does."""
+    if zone.material is None:
+        return ZoneSize(off, covariance, zone.factor)
+    signs = np.append(np.ones(len(zone.parts)), zone.material.sign)
+    departure = zone.material.departure(float(last))
+    return MaterialSize(off[:-1], covariance * np.outer(signs, signs), zone.factor, departure)
 
 
 def _covariance(noise: np.ndarray, known: SceneBudget | None, names: tuple[str, ...]) -> np.ndarray:

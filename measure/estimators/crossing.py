@@ -2,23 +2,34 @@
 
 The function at a fixed place is linear in the image, so all places of all positions are one sparse matrix, applied to a
 whole stack of images at once.
+
+Where two edges run together, of a face and of a shadow on it, the function falls through zero more than once, or nearly
+so, and noise may decide which edge is found. A point counts the less the nearer it is to that, and not at all where it
+would jump: a line through points is then a smooth function of the image.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from imaging.features.locator import MIN_CONTRAST
 from imaging.geometry.segments import numbered
-from measure.features.lines import trapezoid, trend_along
-from measure.features.points import EachPoint, EdgePoints, UnitNoise
+from measure.features.lines import fit_lines, trapezoid, trend_along
+from measure.features.optics import Optics
+from measure.features.points import DECIDED, EachPoint, EdgePoints, UnitNoise
+from measure.features.rim_noise import Drawn
 
 STEP = 0.5  # px between the places across the edge
 _NEAR = 3  # places on each side within which an edge is brighter on one side, whatever lies beside it
 _TRUNCATE = 4  # standard deviations at which the Gaussian ends
+_CERTAIN = 4.0  # standard deviations of the function by noise that a point is from being another: it counts as a whole
+_DIFFERENCE = 0.01  # standard deviations of the function by noise
+_FADES = 2  # steps from the window's ends in which a crossing beside another one counts the less
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +59,8 @@ class CrossingLocator:
         where the image has to tell, which it does not where another edge stands just past the places across.
     least_contrast : float
         Contrast / noise below which an edge point's error is no longer linear in the noise.
+    optics : Optics, optional
+        Whose noise may decide between two crossings; every point counts as a whole where not given.
     """
 
     positions: np.ndarray
@@ -60,13 +73,15 @@ class CrossingLocator:
     level: np.ndarray
     signs: np.ndarray | None = None
     least_contrast: float = MIN_CONTRAST
+    optics: Optics | None = None
 
-    def locate(self, images: np.ndarray) -> EdgePoints:
-        """Edge points in a stack of images, shape (n, height, width)."""
-        profiles = self._profiles(images)
+    def locate(self, images: np.ndarray | Drawn) -> EdgePoints:
+        """Edge points in a stack of images, shape (n, height, width), or in drawn ones."""
+        used = self._used(images)
+        profiles = self._profiles_of(used)
         turned = _reversed(profiles)
         profiles *= _polarity(profiles)
-        return self._points(*_bracket(profiles), profiles, turned)
+        return self._points(profiles, _surest(profiles), turned, self._spread(used))
 
     def locate_each(self, images: np.ndarray) -> EachPoint:
         """Edge points of images (n, height, width), each position by itself: its contrast may be of either sign."""
@@ -84,7 +99,8 @@ class CrossingLocator:
         profiles = self._profiles(clean[None])
         sign = self._signs(profiles)
         profiles *= sign[:, None]
-        return self.locate_each(clean[None]), self._response(profiles, sign[:, 0], clean.size)
+        values = self._by_places(profiles, _bracket(profiles), sign[:, 0])
+        return self.locate_each(clean[None]), self._of_places(values, clean.size)
 
     def _signs(self, profiles: np.ndarray) -> np.ndarray:
         """1 or -1 of each position by itself, (m, n).
@@ -105,11 +121,15 @@ class CrossingLocator:
         valid = found & (np.abs(offset - start) < 1)
         return np.where(valid, self.offsets[0] + STEP * offset, 0.0), valid, np.where(valid, -slope / STEP, 0.0)
 
-    def _points(self, crossing, start, found, profiles: np.ndarray, turned: np.ndarray) -> EdgePoints:
-        offset, valid, slope = self._offsets(crossing, start, found, profiles)
+    def _points(self, profiles: np.ndarray, surest: Crossings, turned: np.ndarray, spread: np.ndarray) -> EdgePoints:
+        offset, valid, slope = self._offsets(*surest[:3], profiles)
         along = np.broadcast_to(self.positions, (profiles.shape[2], self.positions.size))
         contrast, trend, _ = trend_along(along, self.slope_to_contrast * slope.T, 1.0 * valid.T)
-        return EdgePoints(along, offset.T * self.gain, valid.T, contrast, turned, trend, trapezoid(self.positions))
+        even = trapezoid(self.positions)
+        weights = even * _counted(surest, spread, self.offsets.size).T
+        certain = (weights * valid.T).sum(1) / np.maximum((even * valid.T).sum(1), 1e-300)
+        weights[certain < DECIDED] = even
+        return EdgePoints(along, offset.T * self.gain, valid.T, contrast, turned, trend, weights, certain=certain)
 
     def unit_noise(self) -> UnitNoise:
         """Response to noise on a straight edge of unit contrast: the function's over its slope."""
@@ -122,30 +142,69 @@ class CrossingLocator:
 
     def linear_response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
         """Edge points of one noise-free image and d(offset) / d(pixel), shape (m, height * width)."""
-        profiles = self._profiles(clean[None])
+        used = self._used(clean[None])
+        profiles = self._profiles_of(used)
         turned, polarity = _reversed(profiles), _polarity(profiles)
         profiles *= polarity
-        found = self._points(*_bracket(profiles), profiles, turned)
-        return found, self._response(profiles, np.full(len(profiles), polarity[0]), clean.size)
+        spread, surest = self._spread(used), _surest(profiles)
+        found = self._points(profiles, surest, turned, spread)
+        values = self._by_places(profiles, surest, np.full(len(profiles), polarity[0]))
+        if DECIDED <= found.certain[0] < 1:
+            values += self._by_weights(found, profiles, spread, float(polarity[0]))
+        return found, self._of_places(values, clean.size)
 
-    def _response(self, profiles: np.ndarray, polarity: np.ndarray, size: int) -> sparse.csr_array:
-        """d(offset) / d(pixel) of one image whose profiles (m, T, 1) were made positive by signs (m,)."""
-        crossing, start, _ = _bracket(profiles)
+    def _by_weights(self, found: EdgePoints, profiles: np.ndarray, spread: np.ndarray, polarity: float) -> np.ndarray:
+        """What a point's weight, as the function changes it, does to the line: as if it moved by so much, (m, T)."""
+        spread = np.broadcast_to(spread, (len(profiles), 1))
+        counted = _counted(_surest(profiles), spread, self.offsets.size)[:, 0]
+        here = np.flatnonzero((counted > 0) & (counted < 1) & found.valid[0])
+        line = fit_lines(found, found.weights)
+        expected = line.mean_offset + np.tan(line.tilt) * (self.positions[here] - line.mean_along)
+        rest = polarity * (found.offset[0, here] - expected) / counted[here]
+        values = np.zeros((len(profiles), self.offsets.size))
+        values[here] = rest[:, None] * _counted_by(profiles[here, :, 0], spread[here])
+        return values
+
+    def _of_places(self, values: np.ndarray, size: int) -> sparse.csr_array:
+        """Derivatives by all pixels (m, size) of what has these by the function at all places, (m, T)."""
+        rows = sparse.csr_array(values)
+        columns = rows.indices + np.repeat(np.arange(len(values)), np.diff(rows.indptr)) * self.offsets.size
+        pick = sparse.csr_array((rows.data, columns, rows.indptr), (len(values), self.kernel.shape[0]))
+        near = sparse.coo_array(pick @ self.kernel + sparse.diags_array(values.sum(1)) @ self._common)
+        return sparse.csr_array((near.data, (near.row, self.pixels[near.col])), (len(values), size))
+
+    def _by_places(self, profiles: np.ndarray, bracket: tuple[np.ndarray, ...], polarity: np.ndarray) -> np.ndarray:
+        """d(offset) / d(function) of one image whose profiles (m, T, 1) were made positive by signs (m,), (m, T)."""
+        crossing, start = bracket[:2]
         root, slope = _refine(profiles, crossing, start)
-        weights = _cubic_weights(root - crossing)
-        rows = np.arange(crossing.shape[0])[:, None]
-        columns = rows * self.offsets.size + crossing[:, :1] + np.arange(-1, 3)
-        scale = -STEP / slope[:, :1] * (polarity * self.gain)[:, None]
-        values = scale * weights[:, 0]
-        pick = sparse.csr_array(
-            (values.ravel(), (np.repeat(rows, 4), columns.ravel())), (rows.size, self.kernel.shape[0])
+        values = np.zeros(profiles.shape[:2])
+        values[np.arange(len(values))[:, None], crossing[:, :1] + np.arange(-1, 3)] = (
+            -STEP / slope[:, :1] * (polarity * self.gain)[:, None] * _cubic_weights(root - crossing)[:, 0]
         )
-        near = sparse.coo_array(pick @ self.kernel + sparse.diags_array(scale[:, 0]) @ self._common)
-        return sparse.csr_array((near.data, (near.row, self.pixels[near.col])), (rows.size, size))
+        return values
+
+    def _used(self, images: np.ndarray | Drawn) -> np.ndarray:
+        """Grey levels of its pixels, (P, n)."""
+        if isinstance(images, Drawn):
+            return np.ascontiguousarray(images.at(self.pixels).T)
+        return np.ascontiguousarray(images.reshape(len(images), -1)[:, self.pixels].T)
 
     def _profiles(self, images: np.ndarray) -> np.ndarray:
         """The function at all places, shape (m, T, n)."""
-        return self._profiles_of(np.ascontiguousarray(images.reshape(len(images), -1)[:, self.pixels].T))
+        return self._profiles_of(self._used(images))
+
+    def _spread(self, used: np.ndarray) -> np.ndarray:
+        """Standard deviation of the function by noise at each position, (m, n) or (m, 1), of its pixels (P, n)."""
+        if self.optics is None:
+            return np.zeros((len(self.positions), 1))
+        variance = self.optics.noise_at(used.mean(0))
+        return self._gain_of_noise[:, None] * np.sqrt(self.optics.noise_variance if variance is None else variance)
+
+    @cached_property
+    def _gain_of_noise(self) -> np.ndarray:
+        """Standard deviation of the function, less what is common, for that of a pixel, (m,)."""
+        squares = np.add.reduceat(self.kernel.data**2, self.kernel.indptr[:-1])
+        return np.sqrt(squares[self.offsets.size // 2 :: self.offsets.size])
 
     def _profiles_of(self, used: np.ndarray) -> np.ndarray:
         """The same of the grey levels (P, n) of its pixels."""
@@ -209,15 +268,94 @@ def _reversed(profiles: np.ndarray) -> np.ndarray:
     return (first * second < 0) & (np.minimum(np.abs(first), np.abs(second)) > 2 * noise)
 
 
+def _falls(signed: np.ndarray) -> np.ndarray:
+    """How much the function falls from each place to the next where it crosses zero there, else 0; (m, T - 3, n)."""
+    left, right = signed[:, 1:-2], signed[:, 2:-1]
+    return (left - right) * ((left >= 0) & (right < 0))
+
+
 def _bracket(signed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Steepest descent through zero: left index, first estimate (in steps) and whether there is one; shape (m, n)."""
-    left, right = signed[:, 1:-2], signed[:, 2:-1]
-    fall = (left - right) * ((left >= 0) & (right < 0))
-    best = fall.argmax(1)
-    here = np.take_along_axis(left, best[:, None], 1)[:, 0]
+    fall = _falls(signed)
+    return _started(signed, fall, fall.argmax(1))
+
+
+def _started(signed: np.ndarray, fall: np.ndarray, best: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `_bracket` says of a choice (m, n) among the places that have a fall."""
+    here = np.take_along_axis(signed[:, 1:-2], best[:, None], 1)[:, 0]
     drop = np.take_along_axis(fall, best[:, None], 1)[:, 0]
     found = drop > 0
     return best + 1, best + 1 + np.where(found, here / np.where(found, drop, 1), 0), found
+
+
+class Crossings(NamedTuple):
+    """What `_bracket` says, and how far each is from being another one, in the function's unit; all (m, n)."""
+
+    crossing: np.ndarray
+    start: np.ndarray
+    found: np.ndarray
+    apart: np.ndarray
+
+
+def _surest(signed: np.ndarray) -> Crossings:
+    """The steepest descent through zero, and how far noise would have to move the function for another one."""
+    fall = _falls(signed)
+    best, ahead = fall.argmax(1), np.full(fall[:, 0].shape, np.inf)
+    several = (fall > 0).sum(1) > 1
+    if several.any():
+        best[several], ahead[several] = _first_of_several(np.moveaxis(signed, 1, -1)[several])
+    crossing, start, found = _started(signed, fall, best)
+    return Crossings(crossing, start, found, np.minimum(ahead, _clear(signed, crossing)))
+
+
+def _counted(found: Crossings, spread: np.ndarray, size: int) -> np.ndarray:
+    """How much a point counts by how far it is from being another one, 0 to 1, (m, n).
+
+    ``spread`` is the standard deviation of the function, ``size`` the number of its places; one that leaves the window
+    counts the less, too.
+    """
+    whole = np.maximum(_CERTAIN * spread, np.finfo(np.float32).tiny)
+    part = np.minimum(found.apart, whole) / whole * _inside(found.start - 1, size - 3)
+    return part**2 * (3 - 2 * part)  # smooth at both ends, so that its derivative tells what noise does
+
+
+def _counted_by(rows: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Derivative of `_counted` by the values of functions (k, T), by central differences, (k, T)."""
+    step = _DIFFERENCE * spread[..., None] * np.eye(rows.shape[1])
+    above, below = (
+        _counted(_surest(np.moveaxis(rows[:, None] + sign * step, 1, -1)), spread, rows.shape[1]) for sign in (1, -1)
+    )
+    return (above - below) / (2 * _DIFFERENCE * spread)
+
+
+def _inside(place: np.ndarray, last: int) -> np.ndarray:
+    """1, falling to 0 from `_FADES` steps before the ends 0 and ``last`` of places where there may be a crossing."""
+    return np.clip(np.minimum(place, last - place) / _FADES, 0.0, 1.0)
+
+
+def _first_of_several(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of functions (k, T) with several crossings the steepest, and how much it is ahead of the next, (k,).
+
+    Slopes are central differences, interpolated to the crossing: they change little where noise moves it over a place.
+    Towards the window's ends they count the less, so that one that comes into it takes over smoothly.
+    """
+    left, fall = rows[:, 1:-2], _falls(rows)
+    part = np.where(fall > 0, left / np.where(fall > 0, fall, 1.0), 0.0)
+    slope = (rows[:, :-2] - rows[:, 2:]) / 2
+    place = np.arange(left.shape[1]) + part
+    steep = ((1 - part) * slope[:, :-1] + part * slope[:, 1:]) * _inside(place, left.shape[1])
+    steep = np.where(fall > 0, steep, -np.inf)
+    best = np.partition(steep, -2, 1)[:, -2:]
+    return steep.argmax(1), best[:, 1] - best[:, 0]
+
+
+def _clear(signed: np.ndarray, crossing: np.ndarray) -> np.ndarray:
+    """How far from zero the function is within a px beside the crossing, on the side where it is less, (m, n).
+
+    Where it hardly leaves zero, another crossing is about to take this one away, or did so.
+    """
+    before, here, after, beyond = (np.take_along_axis(signed, crossing[:, None] + k, 1)[:, 0] for k in (-1, 0, 1, 2))
+    return np.maximum(np.minimum(np.maximum(before, here), -np.minimum(after, beyond)), 0.0)
 
 
 def _refine(signed: np.ndarray, crossing: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

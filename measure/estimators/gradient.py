@@ -36,7 +36,7 @@ def gradient_along(
     nothing = np.zeros((len(places), 0)), np.zeros((0, pixels.size))
     return CrossingLocator(
         positions, offsets, pixels, kernel, np.sqrt(2 * np.pi) * total**3, gain * np.ones(len(places)),
-        *nothing, signs,
+        *nothing, signs, optics=optics,
     )  # fmt: skip
 
 

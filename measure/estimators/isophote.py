@@ -55,6 +55,7 @@ def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[Cros
         basis=np.concatenate([basis for _, _, basis, _ in sides], 1),
         level=level,
         least_contrast=float(least.mean()),
+        optics=optics,
     ), status.OK if all(clear for *_, clear in sides) else status.CLUTTER
 
 

@@ -16,7 +16,9 @@ from measure.estimators.estimate import Estimate, noisy
 from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout, Optics
-from measure.features.lines import fit_lines, regression
+from measure.features.lines import fit_lines, regression, trapezoid
+from measure.features.points import DECIDED, EdgePoints
+from measure.features.rim_noise import Drawn, drawn, is_linear
 from scenes import status
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 _FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
+_WHOLE = 0.9  # of what a point would count, above which it is certain
 _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
@@ -87,7 +90,8 @@ class PointEstimator:
         enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.caliper.positions.size, 3)
         clear = points.contrast > self.locator.least_contrast * np.sqrt(noise_variance)
         edge = enough & clear & points.sure & (lines.scatter < _MAX_SCATTER)
-        state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, status.OK, status.LOW_CONTRAST))
+        one = np.where(points.certain >= DECIDED, status.OK, status.ILL_CONDITIONED)
+        state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, one, status.LOW_CONTRAST))
         columns = (
             lines.mean_offset - slope * lines.mean_along,
             slope,
@@ -121,26 +125,60 @@ class PointEstimator:
         shapes = np.linalg.inv(np.vander(self._places, 3)).T @ np.vander(noise.along, 3).T
         return (lines[:, None] * shapes).reshape(6, -1) @ noise.response
 
-    def respond_within(self, clean: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-        """Derivative of (level, slope) by some pixels, flat indices in order that hold all of `pixels`, (2, P)."""
-        told = self._response(clean).tocoo()
+    def respond_within(self, clean: np.ndarray, pixels: np.ndarray, *, asked: bool = False) -> np.ndarray:
+        """Derivative of (level, slope) by some pixels, flat indices in order that hold all of `pixels`, (2, P).
+
+        Where noise may decide which of two edges a point is on, drawn noise is ``asked`` whether the line's errors are
+        those that it tells; NaN where they are not.
+        """
+        points, response = self._response(clean)
+        told = response.tocoo()
         found = np.zeros((2, pixels.size))
         row, column = told.coords
         found[row, np.searchsorted(pixels, column)] = told.data
+        if asked and self._may_jump(points) and not self._tells_errors(response, clean):
+            found[:] = np.nan
         return found
 
-    def _response(self, clean: np.ndarray) -> sparse.csr_array:
-        """Derivative of (level, slope) by an image's pixels, (2, H W)."""
+    def _may_jump(self, points: EdgePoints) -> bool:
+        if not isinstance(self.locator, CrossingLocator):
+            return False
+        return bool((points.valid & (points.weights < _WHOLE * trapezoid(self.caliper.positions))).any())
+
+    def _tells_errors(self, response: sparse.csr_array, clean: np.ndarray) -> bool:
+        """Whether a line's errors by noise are those that its derivative tells."""
+        noise = float(np.mean(self.noise_of(clean[None])))
+        (here,), linear, full, found = self._lines(clean[None], noise)[0], [], [], []
+        for images in drawn(clean, self.pixels, self.caliper.optics):
+            each, good = self._lines(images, noise)
+            linear.append(images.first_order(response))
+            full.append(each - here)
+            found.append(good)
+        return is_linear(*map(np.concatenate, (linear, full, found)))
+
+    def noise_of(self, images: np.ndarray) -> np.ndarray | float:
+        """Mean variance of the noise at the edge's pixels, grey levels^2, of all images or of each (n,)."""
+        optics = self.caliper.optics
+        if optics.noise is None or optics.noise.gain <= 0:
+            return optics.noise_variance
+        return optics.noise_at(images.reshape(len(images), -1)[:, self.pixels]).mean(1)
+
+    def _lines(self, images: np.ndarray | Drawn, noise_variance: float) -> tuple[np.ndarray, np.ndarray]:
+        """(level, slope), (n, 2), and whether there is a line, (n,)."""
+        found = self.estimate(images, noise_variance)
+        return np.concatenate([found.level, found.slope], 1), np.isin(found.state[:, 0], status.MEASURED)
+
+    def _response(self, clean: np.ndarray) -> tuple[EdgePoints, sparse.csr_array]:
+        """Edge points, and the derivative of (level, slope) by an image's pixels, (2, H W)."""
         points, response = self.locator.linear_response(clean)
         keep = points.valid[0]
         if keep.sum() < 2:  # no edge at its expected place: `find_shape` may find one elsewhere
             pixels = np.tile(self.pixels, 2)
-            return sparse.csr_array(
-                (np.full(pixels.size, np.nan), pixels, np.arange(3) * len(self.pixels)), (2, clean.size)
-            )
+            nothing = np.full(pixels.size, np.nan), pixels, np.arange(3) * len(self.pixels)
+            return points, sparse.csr_array(nothing, (2, clean.size))
         weights = np.broadcast_to(points.weights, points.along.shape)[0, keep]
         lines = _level_and_slope(points.along[0, keep], weights)
-        return sparse.csr_array(lines) @ sparse.csr_array(response)[np.flatnonzero(keep)]
+        return points, sparse.csr_array(lines) @ sparse.csr_array(response)[np.flatnonzero(keep)]
 
 
 def _level_and_slope(along: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -168,7 +206,7 @@ class SeparateEstimator:
         none = np.zeros((n, 1), int)
         missing = Estimate(nothing, nothing, np.zeros((n, 1, 2)), none, none, np.full((n, 1), status.LOW_CONTRAST))
         seen = self.thinning(images) if self.thinning else images
-        parts = [missing if part is None else part.estimate(seen, _noise_of(part, images)) for part in self.parts]
+        parts = [missing if part is None else part.estimate(seen, part.noise_of(images)) for part in self.parts]
         return Estimate(*(np.concatenate(column, 1) for column in zip(*parts, strict=True)))
 
     def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
@@ -181,15 +219,7 @@ class SeparateEstimator:
                 whole[:, here, here] = part.covariance(own, images)
         return whole
 
-    def respond_within(self, clean: np.ndarray) -> np.ndarray:
+    def respond_within(self, clean: np.ndarray, *, asked: bool = False) -> np.ndarray:
         pixels = self.pixels
-        return np.concatenate([part.respond_within(clean, pixels) if part else np.zeros((2, pixels.size))
+        return np.concatenate([part.respond_within(clean, pixels, asked=asked) if part else np.zeros((2, pixels.size))
                                for part in self.parts])  # fmt: skip
-
-
-def _noise_of(part: PointEstimator, images: np.ndarray) -> np.ndarray | float:
-    """Mean variance of the noise at the pixels of one edge, grey levels^2, of all images or of each (n,)."""
-    optics = part.caliper.optics
-    if optics.noise is None or optics.noise.gain <= 0:
-        return optics.noise_variance
-    return optics.noise_at(images.reshape(len(images), -1)[:, part.pixels]).mean(1)

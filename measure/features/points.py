@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+DECIDED = 0.25  # of an edge's points must be certain (of a faint one alone half are): else noise decides between two
+
 
 class EdgePoints(NamedTuple):
     """Edge points of n images in the caliper of one edge.
@@ -27,6 +29,8 @@ class EdgePoints(NamedTuple):
         How much of the edge each point stands for.
     sure : ndarray of bool, shape (n,)
         Whether the points are those that any picture of this edge would show, whatever its noise.
+    certain : ndarray, shape (n,)
+        Part of the valid points, by how much they count, of which noise does not decide which of two edges they are on.
     """
 
     along: np.ndarray
@@ -37,6 +41,7 @@ class EdgePoints(NamedTuple):
     trend: np.ndarray | float = 0.0
     weights: np.ndarray | float = 1.0
     sure: np.ndarray | bool = True
+    certain: np.ndarray | float = 1.0
 
 
 class UnitNoise(NamedTuple):

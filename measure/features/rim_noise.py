@@ -1,8 +1,8 @@
-"""Are the errors of a circle linear in the noise, as the variance that is propagated says?
+"""Are the errors of a circle, or of a line, linear in the noise, as the variance that is propagated says?
 
-Where two edges are near, of a rim and of what lies beside it, noise may decide at a place which of them is found, and
-with it from where the circle is looked for again. Its crossings then jump from one to the other, which no derivative by
-the pixels of a noise-free image tells. Drawn images answer it: circles that are found in them beside those that the
+Where two edges are near, of a rim or a border and of what lies beside it, noise may decide at a place which of them is
+found, and with it from where a circle is looked for again. Its crossings then jump from one to the other, which no
+derivative by the pixels of a noise-free image tells. Drawn images answer it: what is found in them beside what the
 derivative gives of the same noise.
 """
 
@@ -111,7 +111,7 @@ def is_linear(linear: np.ndarray, full: np.ndarray, found: np.ndarray) -> bool:
     linear, full : ndarray, shape (n, p)
         Errors of p parameters in n drawn images, to first order and in full.
     found : ndarray of bool, shape (n,)
-        In which images the circle is.
+        In which images the circle or line is.
 
     Examples
     --------

@@ -18,7 +18,7 @@ from planner.uncertainty.conformity import COVERAGE, Decision
 from scenes import InvalidInput
 from scenes.status import OK, is_trusted
 
-_REACH = 9.0  # standard deviations: less than 1e-18 is beyond
+REACH = 9.0  # standard deviations: less than 1e-18 is beyond
 _ANGLES, _WEIGHTS = np.polynomial.legendre.leggauss(160)
 
 
@@ -71,10 +71,15 @@ class ZoneSize:
     @cached_property
     def mean(self) -> float:
         """Of the law: at least `value`, and not 0 where that is."""
+        middles, sigmas = self._principal
         low, high = self._reach
-        nodes = (low + high) / 2 + (high - low) / 2 * _ANGLES
-        beyond = np.array([1 - self._within(radius) for radius in nodes])
-        return self.factor * (low + (high - low) / 2 * float(_WEIGHTS @ beyond))
+        beside = [each for each in np.abs(middles) if low < each < high]  # a nearly exact component starts there
+        borders = np.array([low, *sorted(beside), high])
+        first, last = borders[:-1, None], borders[1:, None]
+        nodes = ((first + last) / 2 + (last - first) / 2 * np.sin(np.pi / 2 * _ANGLES)).ravel()
+        weights = (np.pi / 2 * np.cos(np.pi / 2 * _ANGLES) * _WEIGHTS * (last - first) / 2).ravel()
+        beyond = 1 - within(nodes, np.tile(middles, (nodes.size, 1)), sigmas)
+        return self.factor * (low + float(weights @ beyond))
 
     @property
     def u(self) -> float:
@@ -123,25 +128,45 @@ class ZoneSize:
     @property
     def _reach(self) -> tuple[float, float]:
         """Lengths of v between which all of the law is."""
-        away, most = float(np.linalg.norm(self.off)), _REACH * float(self._principal[1][-1])
+        away, most = float(np.linalg.norm(self.off)), REACH * float(self._principal[1][-1])
         return max(away - most, 0.0), away + math.sqrt(len(self.off)) * most
 
     def _within(self, radius: float) -> float:
-        """Probability of |v| <= radius: of two components by the one that scatters least, given it of the other."""
-        (*beside, middle), (*narrow, wide) = self._principal
-        if not beside:
-            return float(_inside(np.array(radius), middle, wide))
-        low, high = (max(-radius, beside[0] - _REACH * narrow[0]), min(radius, beside[0] + _REACH * narrow[0]))
-        if low > high:
-            return 0.0
-        if narrow[0] == 0:
-            return float(_inside(np.sqrt(max(radius**2 - beside[0] ** 2, 0.0)), middle, wide))
-        turn = np.pi / 2 * _ANGLES  # by its sine, for a chord's length falls like a root at the circle's ends
-        at = (low + high) / 2 + (high - low) / 2 * np.sin(turn)
-        step = np.pi / 2 * _WEIGHTS * (high - low) / 2 * np.cos(turn)
-        density = np.exp(-0.5 * ((at - beside[0]) / narrow[0]) ** 2) / (math.sqrt(2 * math.pi) * narrow[0])
-        chord = np.sqrt(np.maximum(radius**2 - at**2, 0.0))
-        return float(min((step * density) @ _inside(chord, middle, wide), 1.0))
+        """Probability of |v| <= radius."""
+        middles, sigmas = self._principal
+        return float(within(np.array([radius]), middles[None], sigmas)[0])
+
+
+def within(radius: np.ndarray, middles: np.ndarray, sigmas: np.ndarray) -> np.ndarray:
+    """Probability of |v| <= radius: of two components by the one that scatters least, given it of the other.
+
+    Parameters
+    ----------
+    radius : ndarray, shape (n,)
+    middles : ndarray, shape (n, k)
+        Means of the k components, 1 or 2, which are independent, the one that scatters least first.
+    sigmas : ndarray, shape (k,)
+        Their standard deviations.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    middle, wide, radius = middles[:, -1], sigmas[-1], np.asarray(radius, float)
+    if len(sigmas) == 1:
+        return np.where(radius < 0, 0.0, _inside(np.maximum(radius, 0.0), middle, wide))
+    beside, narrow = middles[:, 0], sigmas[0]
+    low, high = np.maximum(-radius, beside - REACH * narrow), np.minimum(radius, beside + REACH * narrow)
+    if narrow == 0:
+        told = _inside(np.sqrt(np.maximum(radius**2 - beside**2, 0.0)), middle, wide)
+        return np.where((low > high) | (radius < 0), 0.0, told)
+    low, high = low[:, None], np.maximum(high, low)[:, None]
+    turn = np.pi / 2 * _ANGLES  # by its sine, for a chord's length falls like a root at the circle's ends
+    at = (low + high) / 2 + (high - low) / 2 * np.sin(turn)
+    step = np.pi / 2 * _WEIGHTS * (high - low) / 2 * np.cos(turn)
+    density = np.exp(-0.5 * ((at - beside[:, None]) / narrow) ** 2) / (math.sqrt(2 * math.pi) * narrow)
+    chord = np.sqrt(np.maximum(radius[:, None] ** 2 - at**2, 0.0))
+    return np.minimum((step * density * _inside(chord, middle[:, None], wide)).sum(-1), 1.0)
 
 
 def _inside(half: np.ndarray, mean: float, sigma: float) -> np.ndarray:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from scenes.measurands.drawn_faces import SAME, Faces, angle_of, centres, measurand, sides
+from scenes.measurands.drawn_places import Place, pattern_of, places_of
 from scenes.measurands.drawn_tolerances import toleranced
 from scenes.measurands.features import Side, along_of
 from scenes.measurands.measurands import Measurand
@@ -95,6 +97,7 @@ def _features(known: Faces, each: Characteristic, unit: Unit) -> Iterator[list[M
         yield _angles(known, each, pairs)
     elif each.kind in ("linear distance", "thickness", "width"):
         yield _widths(known, each, unit, pairs)
+        yield from _apart(known, each, unit, (one, other))
 
 
 def _pairs(known: Faces, one: list[Plane], other: list[Plane]) -> list[tuple[Plane, Plane]]:
@@ -110,7 +113,7 @@ def _why_not(known: Faces, each: Characteristic) -> str:
     if each.kind in ("diameter", "radius"):
         return f"no {'whole rim' if each.kind == 'diameter' else 'rim'} of it is an edge of the part"
     if each.kind in ("linear distance", "thickness", "width", "angle"):
-        return "no two straight edges of its faces are as far apart as it says"
+        return "no two straight edges or centres of its faces are as far apart as it says"
     return _NOT_YET
 
 
@@ -131,6 +134,38 @@ def _widths(known: Faces, each: Characteristic, unit: Unit, pairs: list[tuple[Pl
         if np.linalg.norm(np.cross(planes[0].normal, planes[1].normal)) <= SAME:
             found += _across(known, in_unit(each.value, "mm", unit), planes)
     return _by_sides(each, unit, "width", found)
+
+
+def _apart(known: Faces, each: Characteristic, unit: Unit, both: tuple[list, list]) -> Iterator[list[Measurand]]:
+    """Of each bore, slot or pattern that lies so far from another one, or from an edge of a plane, in one plane."""
+    rounds = [[surface for surface in some if isinstance(surface, Cylinder)] for some in both]
+    wanted, planes = in_unit(each.value, "mm", unit), [s for some in both for s in some if isinstance(s, Plane)]
+    if all(rounds):
+        ways = [[*places_of(known, walls), pattern_of(known, walls)] for walls in rounds]
+        pairs = [(one, other) for some in ways[0] for one in some for rest in ways[1] for other in rest]
+        level = [(one, other) for one, other in pairs if one.is_level(other.at, known.near)]
+        near = [pair for pair in level if abs(np.linalg.norm(pair[0].at - pair[1].at) - wanted) <= _AS_DRAWN * wanted]
+        yield [_between(each, unit, "distance", one, (other.feature, other.name)) for one, other in near]
+    elif any(rounds) and planes:
+        for some in places_of(known, rounds[0] or rounds[1]):
+            yield [m for place in some for m in _from_planes(known, each, unit, place, planes, wanted)]
+
+
+def _from_planes(
+    known: Faces, each: Characteristic, unit: Unit, place: Place, planes: list[Plane], wanted: float
+) -> Iterator[Measurand]:
+    """From an edge of a plane, in the plane of a rim, the longest first."""
+    solid = known.solid
+    edges = [edge for plane in planes for edge in known.edges_in(plane)]
+    for edge in sorted(edges, key=lambda each: -solid.length(each)):
+        ends = solid.vertices[list(edge.ends)]
+        away = np.linalg.norm(np.cross(place.at - ends[0], along_of(solid, Side(edge=edge.name))))
+        if all(place.is_level(end, known.near) for end in ends) and abs(away - wanted) <= _AS_DRAWN * wanted:
+            yield _between(each, unit, "offset", place, (sides(edge)[0], edge.name))
+
+
+def _between(each: Characteristic, unit: Unit, kind: str, place: Place, other: tuple[Any, str]) -> Measurand:
+    return measurand(each, unit, kind, (place.feature, other[0]), f"{place.name} {other[1]}")
 
 
 def _across(known: Faces, wanted: float, planes: tuple[Plane, Plane]) -> list[tuple[float, Edge, Edge]]:

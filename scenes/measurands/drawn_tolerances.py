@@ -10,10 +10,11 @@ import numpy as np
 
 from scenes.measurands.between import CentreLine, SquareAt, Through
 from scenes.measurands.drawn_faces import SAME, Faces, centres, limited, sides
+from scenes.measurands.drawn_places import Place, pattern_of, places_of
 from scenes.measurands.features import along_of
 from scenes.measurands.measurands import Measurand
 from scenes.parts.pmi import Characteristic
-from scenes.parts.solid import Circle, Edge
+from scenes.parts.solid import Edge
 from scenes.parts.surfaces import Cylinder, Plane
 from scenes.units import Unit, in_unit
 
@@ -23,6 +24,7 @@ _SURFACE = {"flatness", "cylindricity", "profile of a surface", "circular runout
 _INSIDE = "it needs the form of a whole surface, which edges in a picture do not show"
 _NOT_YET = "not yet among the kinds of measurand"
 _NO_ZONE = "the file gives no size of the zone"
+_ZERO = "its zone is 0 at maximum material: write it with tolerance 0 and the name of its size (maximum_material)"
 _NO_FACES = "the file says of no face what it is of"
 _AXIS = "the direction of an axis shows in no one plane"
 _NO_DATUM = "the file says of no face what datum {} is"
@@ -67,7 +69,7 @@ def toleranced(known: Faces, each: Characteristic, datums: dict[str, tuple[int, 
     if each.kind not in _KINDS:
         return _INSIDE if each.kind in _SURFACE else _NOT_YET
     if not each.zone:
-        return _NO_ZONE
+        return _ZERO if each.zone == 0 and "M" in each.modifiers else _NO_ZONE
     lost = [letter for letter in _letters(each) if not known.of(datums.get(letter, ()))]
     if not each.faces or not known.of(each.faces) or lost:
         return _NO_DATUM.format(lost[0]) if lost else _NO_FACES
@@ -93,19 +95,10 @@ def _letters(each: Characteristic) -> list[str]:
     return [letter for system in each.datums for letter in system.split("-")]
 
 
-def _bores(asked: _Asked, walls: tuple[Cylinder, ...]) -> Iterator[list[Circle]]:
-    """Rims of each bore or shaft, mostly of two halves."""
-    told: set[str] = set()
-    for wall in walls:
-        rims = [circle for circle in asked.known.circles_of(wall) if circle.name not in told]
-        told |= {circle.name for circle in rims}
-        if rims:
-            yield rims
-
-
 def _positions(asked: _Asked) -> list[list[Measurand]] | str:
-    """Of bores and shafts by a rim each, of the middle between two parallel planes by two edges."""
-    if len(asked.planes) == 2 and not asked.walls:
+    """Of bores and shafts by a rim each, of slots by their round ends, of the middle between two parallel planes by two
+    edges."""
+    if len(asked.planes) == 2 and not (asked.walls and asked.each.is_round):
         return [_middle_position(asked)]
     if not asked.walls:
         return _ELSEWHERE
@@ -114,7 +107,7 @@ def _positions(asked: _Asked) -> list[list[Measurand]] | str:
         return _FACE_ONLY
     if not asked.each.is_round:
         return _ONE_WAY
-    return [[m for rim in rims for m in _position(asked, rim)] for rims in _bores(asked, asked.walls)]
+    return [[m for p in places for m in _position(asked, p)] for places in places_of(asked.known, asked.walls)]
 
 
 def _fixes(datum: tuple, axis: np.ndarray) -> bool:
@@ -128,39 +121,39 @@ def _fixes(datum: tuple, axis: np.ndarray) -> bool:
     )
 
 
-def _position(asked: _Asked, rim: Circle) -> list[Measurand]:
+def _position(asked: _Asked, place: Place) -> list[Measurand]:
     """In the plane of a rim: about a true place from two datums, at a true distance from one; bores at other heights
     are seen along the axis."""
-    datums = [datum for datum in asked.datums if _fixes(datum, rim.axis)]
-    system = [_datum_at(asked, datum, rim) for datum in datums]
+    datums = [datum for datum in asked.datums if _fixes(datum, place.axis)]
+    system = [_datum_at(asked, datum, place) for datum in datums]
     if len(system) > 1 and not all(system):
-        system = [_nearest_bore(asked, datum, rim) for datum in datums]
+        system = [_nearest_bore(asked, datum, place) for datum in datums]
     if not system or not all(system):
         return []
     first, *rest = system
-    of = f"{rim.name} " + " ".join(each.name for each in system[:2])
-    features = tuple(centres(each)[0] if isinstance(each, Circle) else sides(each)[0] for each in system[:2])
+    of = f"{place.name} " + " ".join(each.name for each in system[:2])
+    features = tuple(each.feature if isinstance(each, Place) else sides(each)[0] for each in system[:2])
     if rest:
-        return [asked.made("true_position", (*centres(rim), *features), of)]
-    kind = "distance" if isinstance(first, Circle) else "offset"
-    return [asked.made(kind, (*centres(rim), *features), of, 0.5)]
+        return [asked.made("true_position", (place.feature, *features), of)]
+    kind = "distance" if isinstance(first, Place) else "offset"
+    return [asked.made(kind, (place.feature, *features), of, 0.5)]
 
 
-def _datum_at(asked: _Asked, datum: tuple, rim: Circle) -> Circle | Edge | None:
-    """What stands for a datum in the plane of a rim: a bore's own, or a plane's longest edge."""
+def _datum_at(asked: _Asked, datum: tuple, place: Place) -> Place | Edge | None:
+    """What stands for a datum in the plane of a rim: a bore's own or that of a pattern, or a plane's longest edge."""
     known = asked.known
-    circles = [circle for wall in datum if isinstance(wall, Cylinder) for circle in known.circles_of(wall)]
-    level = [c for c in circles if c.name != rim.name and abs((c.centre - rim.centre) @ rim.axis) <= known.near]
+    found = pattern_of(known, [wall for wall in datum if isinstance(wall, Cylinder)])
+    level = [each for each in found if each.name != place.name and place.is_level(each.at, known.near)]
     edges = [edge for plane in datum if isinstance(plane, Plane) for edge in known.edges_in(plane)]
-    flat = [edge for edge in edges if _in_plane(asked, edge, rim.centre, rim.axis)]
+    flat = [edge for edge in edges if _in_plane(asked, edge, place.at, place.axis)]
     return next(iter(level), None) or max(flat, key=known.solid.length, default=None)
 
 
-def _nearest_bore(asked: _Asked, datum: tuple, rim: Circle) -> Circle | None:
-    """The rim of a datum's bore whose height is nearest to that of another rim."""
-    circles = [circle for wall in datum if isinstance(wall, Cylinder) for circle in asked.known.circles_of(wall)]
-    away = [round(abs(float((circle.centre - rim.centre) @ rim.axis)), 6) for circle in circles]
-    return circles[int(np.argmin(away))] if circles else None
+def _nearest_bore(asked: _Asked, datum: tuple, place: Place) -> Place | None:
+    """The rim of a datum's bore, or those of its pattern, whose height is nearest to that of another rim."""
+    found = pattern_of(asked.known, [wall for wall in datum if isinstance(wall, Cylinder)])
+    away = [round(abs(float((each.at - place.at) @ place.axis)), 6) for each in found]
+    return found[int(np.argmin(away))] if found else None
 
 
 def _in_plane(asked: _Asked, edge: Edge, point: np.ndarray, normal: np.ndarray) -> bool:
@@ -223,13 +216,15 @@ def _datum_lines(asked: _Asked, point: np.ndarray, normal: np.ndarray, across: n
 
 
 def _concentric(asked: _Asked) -> list[list[Measurand]] | str:
-    """A rim and one of the datum's, the nearest to it first."""
-    walls = tuple(wall for datum in asked.datums for wall in datum if isinstance(wall, Cylinder))
-    others, found = [rim for rims in _bores(asked, walls) for rim in rims], []
-    for rims in _bores(asked, asked.walls):
-        pairs = [(rim, other) for rim in rims for other in others if abs(abs(rim.axis @ other.axis) - 1) <= SAME]
-        pairs.sort(key=lambda pair: round(abs(float((pair[1].centre - pair[0].centre) @ pair[0].axis)), 6))
-        found.append([asked.made("concentricity", centres(*pair), f"{pair[0].name} {pair[1].name}") for pair in pairs])
+    """A rim, or the middle of a slot, and the datum's own, the nearest to it first."""
+    others = pattern_of(asked.known, [w for datum in asked.datums for w in datum if isinstance(w, Cylinder)])
+    found = []
+    for places in places_of(asked.known, asked.walls):
+        pairs = [(place, other) for place in places for other in others]
+        pairs = [pair for pair in pairs if abs(abs(pair[0].axis @ pair[1].axis) - 1) <= SAME]
+        pairs.sort(key=lambda pair: round(abs(float((pair[1].at - pair[0].at) @ pair[0].axis)), 6))
+        made = (("concentricity", (one.feature, other.feature), f"{one.name} {other.name}") for one, other in pairs)
+        found.append([asked.made(*each) for each in made])
     return found if any(found) else _NO_RIMS
 
 

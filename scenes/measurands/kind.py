@@ -61,6 +61,9 @@ class MeasurandKind:
     0 for a dimension. ``tolerance`` of a measurand is then the zone's diameter or width.
     """
 
+    takes_material: ClassVar[bool] = False
+    """Whether its zone may grow with a feature's size (`scenes.measurands.material`)."""
+
     def takes(self, features: tuple) -> bool:
         """Whether these features, in their order, make one."""
         return any(

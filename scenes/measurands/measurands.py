@@ -27,12 +27,6 @@ class Tolerance(Model):
     minus: Spread
     """Below it."""
 
-    @model_validator(mode="after")
-    def _not_empty(self) -> Tolerance:
-        if not self.plus + self.minus > 0:
-            raise ValueError("tolerance must be greater than 0 above or below, got 0 for both")
-        return self
-
     @property
     def half(self) -> float:
         """Half of the whole zone: what a standard deviation is compared with."""
@@ -122,8 +116,9 @@ class Measurand(Model):
 
     Geometric tolerances, whose ``tolerance`` is the zone's width or diameter: ``true_position`` of a corner or centre
     in a datum system of two features, an edge and an edge or a point, or a point and a point or an edge, as NAME.x and
-    NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, as NAME.x and NAME.y; ``symmetry`` of a line
-    or a point about a line; ``parallelism`` and ``perpendicularity`` of an edge to a datum edge.
+    NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, the middle of a slot or the centre of a
+    pattern among them, as NAME.x and NAME.y; ``symmetry`` of a line or a point about a line; ``parallelism`` and
+    ``perpendicularity`` of an edge to a datum edge.
     """
 
     name: Title
@@ -135,9 +130,13 @@ class Measurand(Model):
     nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Coordinate, Coordinate] | None = None
     """The value that is wanted, the scene's unit or degrees; two for a place; the object's own if left out."""
     tolerance: Annotated[Tolerance | None, BeforeValidator(_both_ways)] = None
-    """How far it may lie from it, the scene's unit or degrees: one number, or plus and minus; a zone's size."""
+    """How far it may lie from it, the scene's unit or degrees: one number, or plus and minus; a zone's size, which may
+    be 0 where it grows."""
     weight: Positive = 1.0
     """In the planner's weighted sum."""
+    maximum_material: Title | None = None
+    """Of a zone that grows as the feature departs from its maximum material size (ISO 2692): the name of the diameter,
+    or of the slot's width (NAME.width), that is this size; its own tolerance says what is most."""
 
     @model_validator(mode="after")
     def _complete(self) -> Measurand:
@@ -152,6 +151,11 @@ class Measurand(Model):
             number = ("left out", "one number", "two numbers")[kind.nominals]
             raise ValueError(f"nominal must be {number} for kind {self.kind}, got {self.nominal}")
         kind.check_values(self)
+        if self.tolerance is not None and self.maximum_material is None and not self.tolerance.half > 0:
+            raise ValueError("tolerance must be greater than 0 above or below, got 0 for both")
+        if self.maximum_material is not None and not (kind.takes_material and self.tolerance is not None):
+            without = "without tolerance" if kind.takes_material else f"for kind {self.kind}"
+            raise ValueError(f"maximum_material must be left out {without}, got {self.maximum_material!r}")
         return self
 
     @property
@@ -205,7 +209,20 @@ class Task(Model):
 @lru_cache(maxsize=256)
 def quantities_of(task: Task | None, measurands: tuple[Measurand, ...]) -> tuple[Quantity, ...]:
     """All numbers that a scene asks for."""
-    return sum((measurand.quantities for measurand in measurands), () if task is None else (task.quantity,))
+    found = sum((measurand.quantities for measurand in measurands), () if task is None else (task.quantity,))
+    return widened(found, measurands)
+
+
+def widened(quantities: tuple[Quantity, ...], measurands: tuple[Measurand, ...]) -> tuple[Quantity, ...]:
+    """Numbers with the limits of zones that grow as of a feature in the middle of its size's limits."""
+    sizes = {each.name: each.tolerance for each in quantities}
+    more = {}
+    for each in measurands:
+        size = sizes.get(each.maximum_material) if each.maximum_material else None
+        if size is not None and each.tolerance is not None:
+            half = (each.tolerance.half + size.half) / MEASURANDS[each.kind].zone
+            more |= {number.name: Tolerance(plus=half, minus=half) for number in each.quantities}
+    return tuple(replace(each, tolerance=more[each.name]) if each.name in more else each for each in quantities)
 
 
 class Locator(Model):

@@ -96,7 +96,7 @@ def _hole_distances(solid: Solid) -> Iterator[_Row]:
 
 def _arc_diameters(solid: Solid) -> Iterator[_Row]:
     """Of half bores and round ends, a slot's once."""
-    told = {arc.name for _, _, arc in _slots(solid)}
+    told = {arc.name for _, _, arc in slots(solid)}
     for arc in sorted(_round_ends(solid), key=lambda each: _largest(each.radius)):
         if arc.name not in told:
             yield f"diameter {arc.name}", "diameter", (Centre(circle=arc.name),), 2 * arc.radius
@@ -104,7 +104,7 @@ def _arc_diameters(solid: Solid) -> Iterator[_Row]:
 
 def _slot_lengths(solid: Solid) -> Iterator[_Row]:
     """Between the centres of the round ends of slots, the longest first."""
-    for apart, one, other in sorted(_slots(solid), key=lambda slot: _largest(slot[0])):
+    for apart, one, other in sorted(slots(solid), key=lambda slot: _largest(slot[0])):
         yield _distance(one, other, apart)
 
 
@@ -117,7 +117,7 @@ def _round_ends(solid: Solid) -> list[Circle]:
     return [arc for arc in solid.arcs if arc.turn >= _ROUND_END]
 
 
-def _slots(solid: Solid) -> list[tuple[float, Circle, Circle]]:
+def slots(solid: Solid) -> list[tuple[float, Circle, Circle]]:
     """Round ends of one face, as wide as each other, which turn away from each other: how far apart, and both."""
     found = []
     for one, other in combinations(_round_ends(solid), 2):

@@ -17,6 +17,7 @@ class Symmetry(MeasurandKind):
     features = ("ee", "pe")
     nominals = 0
     zone = 2.0
+    takes_material = True
 
     def evaluated(self, seen, quantity, plane) -> Evaluated:
         """Positive to the left of the datum line, seen from outside."""

@@ -20,6 +20,7 @@ class TruePosition(MeasurandKind):
     parts = "x", "y"
     nominals = 2
     zone = 2.0
+    takes_material = True
     is_flat = False
 
     def check(self, solid, key, quantity) -> None:

@@ -7,6 +7,29 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
+class Material:
+    """What a zone grows with (ISO 2692, maximum material requirement).
+
+    Attributes
+    ----------
+    of : str
+        Name of the number that is the feature's size.
+    limit : float
+        The size at which there is most material, the scene's unit: the least of a hole, the largest of a shaft.
+    sign : float
+        1 of a hole, -1 of a shaft.
+    """
+
+    of: str
+    limit: float
+    sign: float
+
+    def departure(self, size: float) -> float:
+        """How much less material a feature of a size has: what the zone is larger by."""
+        return self.sign * (size - self.limit)
+
+
+@dataclass(frozen=True)
 class Zone:
     """A zone about a true place, or between two parallel lines.
 
@@ -20,7 +43,9 @@ class Zone:
     factor : float
         Size over that length, or over the number's magnitude: 2 of a zone about a true place.
     size : float or None
-        What the drawing allows: diameter or width, the scene's unit.
+        What the drawing allows: diameter or width, the scene's unit; at maximum material, where it grows.
+    material : Material, optional
+        What it grows with.
     """
 
     name: str
@@ -28,11 +53,17 @@ class Zone:
     parts: tuple[str, ...]
     factor: float
     size: float | None
+    material: Material | None = None
 
     @property
     def is_joint(self) -> bool:
         """Whether no number alone says that it is kept."""
-        return len(self.parts) > 1
+        return len(self.parts) > 1 or self.material is not None
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of all that decides whether it is kept: its parts, and the size with which it grows."""
+        return self.parts if self.material is None else (*self.parts, self.material.of)
 
 
 def joint_parts(zones: Iterable[Zone]) -> frozenset[str]:

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import measure
 import planner
@@ -14,7 +15,8 @@ from tests import toleranced
 from tests.commands import ice
 from tests.proofs import kinds
 from validation.budgets import capability
-from validation.inspection import expanded
+from validation.inspection import expanded, inspect
+from validation.report.inspection_files import About, records
 from validation.zones import measured_zones
 
 pytestmark = pytest.mark.render
@@ -129,6 +131,65 @@ def test_all_kinds_scatter_as_propagated(tmp_path):
     assert not any(row.holds(len(rows), 3.0) for row in rows)  # negative control
     assert len(zones) == 6
     assert all(zone.p > 0.01 / len(zones) > zone.p_normal for zone in zones)
+
+
+def test_centres_of_slots_and_patterns_are_measured_and_decided(tmp_path):
+    """Their values the plate's within 5 standard uncertainties, as scattered as propagated; budgeted and decided as
+    those of corners and bores."""
+    scene = toleranced.scene(tmp_path, ("slot",), 40, **_TINY)
+    slot, pattern = {"midpoint": [{"circle": "c8"}, {"circle": "c10"}]}, {"pitch_circle": ["c2", "c6", "c4"]}
+    rows = (
+        ("place", "true_position", [slot, {"circle": "c2"}, {"circle": "c6"}]),
+        ("apart", "distance", [slot, pattern]),
+    )
+    scene = scene.with_(
+        measurands=[{"name": name, "kind": kind, "features": each, "tolerance": 0.3} for name, kind, each in rows]
+    )
+    picture = scenes.Picture.of(scene, (20, 300), (30, 350))
+    clean = render.image(picture, quality=render.Quality(seed=3))
+    told = measure.propagate(clean, picture).measurands
+    found = measure.measure(render.expose(clean, scene.noise, np.random.default_rng(4), 120), picture)
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 119) / 119
+    ratios = found.value.var(0, ddof=1) / np.diag(told.covariance)
+    assert ((low < ratios) & (ratios < high)).all(), ratios  # margin: chance, an interval of 99.9 %
+    assert not ((low < ratios / 2) & (ratios / 2 < high)).any()
+    one = measure.measure(clean, picture)
+    made, known = inspect(one), planner.budget(picture)
+    assert [row.requirement.name for row in made.rows] == ["place.x", "place.y", "apart"]
+    assert made.rows[2].decision == made.decision == "pass"
+    (zone,) = measured_zones(one, expanded(one))
+    assert (zone.zone.name, zone.decision) == ("place", "pass")
+    assert [each.name for each in known.measurands] == [row.requirement.name for row in made.rows]
+    assert np.abs(one.value - np.array([22.0, 10.0, 18.0 - toleranced.CENTRE[1]])).max() < 0.03  # a tenth of the zone
+
+
+def test_a_zone_that_grows_with_its_bore(tmp_path):
+    """A true place 0.25 mm beside the bore's, as a diameter: beyond 0.2, but its diameter of 8 is 0.1 above the least.
+
+    Decided, on the inspection's page, in its CSV and in QIF as in the command's JSON."""
+    bores = [{"circle": name} for name in ("c4", "c2", "c6")]
+    rows = [
+        {"name": "bore", "kind": "diameter", "features": bores[:1], "tolerance": 0.1},
+        {"name": "place", "kind": "true_position", "features": bores, "tolerance": 0.2, "nominal": [22.1, 24.075]},
+    ]
+    plate = toleranced.scene(tmp_path, ("bolts",), 40, **_TINY).with_(measurands=rows)
+    picture = scenes.Picture.of(plate, (20, 300), (30, 350))
+    clean = render.image(picture, quality=render.Quality(seed=3))
+    rows[1]["maximum_material"] = "bore"
+    grown = picture.with_scene(plate.with_(measurands=rows))
+    found = [inspect(measure.measure(clean, each)) for each in (picture, grown)]
+    assert [each.zones[0].decision for each in found] == [each.decision for each in found] == ["fail", "pass"]
+    plain, told = (each.zones[0].facts for each in found)
+    assert told["value"] == pytest.approx(plain["value"], rel=1e-12)
+    assert told["maximum_material"]["bonus"] == pytest.approx(0.1, abs=0.02)  # a fifth of it: by the rim's pixels
+    assert told["size"] == pytest.approx(0.2 + told["maximum_material"]["bonus"])
+    assert plain["maximum_material"] is None
+    last = records(found[1], About("SN1", ("picture.png",)))[-1]
+    assert (last["upper"], last["decision"]) == (told["size"], "pass")
+    size = found[1].zones[0].size
+    alone = size.covariance[:2, :2]
+    assert size.covariance[2, 2] > 0
+    assert found[0].zones[0].size.covariance == pytest.approx(alone)
 
 
 def test_a_block_quickly(task1):

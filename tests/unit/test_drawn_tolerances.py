@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from scenes.measurands.drawn import drawn
+from scenes.measurands.drawn_material import asks_for_material, with_material
 from scenes.parts import step
 from scenes.parts.pmi import Characteristic, Pmi
 from scenes.parts.surfaces import Cylinder, Plane
 from tests import step_parts
+from validation import new_scene
 
 pytestmark = pytest.mark.skipif(find_spec("OCP") is None, reason="needs OpenCASCADE: pip install 'ice-vision[step]'")
 
@@ -139,6 +141,7 @@ def test_rims_about_one_axis(tmp_path):
         ("position", [4.0], (TOP,), {"is_round": True}, "its datums fix no place in the plane"),
         ("position", [4.0], (TOP, FRONT, None), {"is_round": True}, "of no face what datum C is"),
         ("position", [4.0], (TOP, FRONT, LEFT), {"zone": None}, "gives no size of the zone"),
+        ("position", [4.0], (TOP, FRONT, LEFT), {"zone": 0.0, "modifiers": ("M",)}, "is 0 at maximum material"),
         ("perpendicularity", [4.0], (TOP,), {"is_round": True}, "the direction of an axis"),
         ("perpendicularity", [FRONT], (), {}, "no edge or circle of it lies in one plane"),
         ("flatness", [TOP], (), {}, "form of a whole surface"),
@@ -155,3 +158,31 @@ def test_a_radius_of_a_bore(block):
     each = Characteristic(1, "radius", value=3.0, plus=0.1, minus=0.1, faces=numbers(block, 3.0))
     (found,) = drawn(block, Pmi((each,), {}, {place: place for place in block.places}), "mm")
     assert told(found) == ("radius", 0.1)
+
+
+def sized(block, **facts):
+    """A bore's position with M and the diameters of two bores, the second with limits if any; what becomes of them."""
+    letters = {"A": numbers(block, TOP), "B": numbers(block, 3.0), "C": numbers(block, 3.5)}
+    each = (
+        Characteristic(1, "diameter", value=6.0, plus=0.1, minus=0.1, faces=numbers(block, 3.0)),
+        Characteristic(2, "diameter", value=8.0, faces=numbers(block, 4.0), **facts),
+        Characteristic(3, "position", zone=0.2, is_round=True, faces=numbers(block, 4.0), datums=tuple("ABC"),
+                       modifiers=("M",)),
+    )  # fmt: skip
+    asked_for = drawn(block, Pmi(each, letters, {place: place for place in block.places}), "mm")
+    return asked_for, [row[0] for found in asked_for for row in found.candidates]
+
+
+def test_a_zone_with_the_modifier_m_grows_with_the_bores_diameter(block):
+    """Of the same bore, at whichever rim; where the file gives that no limits it stays as at maximum material."""
+    asked_for, measurands = sized(block, plus=0.2, minus=0.05)
+    assert asks_for_material(asked_for) == {m.name for row in asked_for[2].candidates for m in row}
+    one, own, place = with_material(block.solid, measurands, asked_for)
+    assert (one, own) == tuple(measurands[:2])
+    assert place.maximum_material == own.name
+    text = new_scene._measurand(place, is_growing=True)
+    assert f'maximum_material = "{own.name}" #' in text
+    asked_for, measurands = sized(block)
+    assert with_material(block.solid, measurands, asked_for) == tuple(measurands)
+    assert "# at maximum material: its diameter" in new_scene._measurand(measurands[-1], is_growing=True)
+    assert "material" not in new_scene._measurand(measurands[-1])

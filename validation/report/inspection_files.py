@@ -29,7 +29,8 @@ NOTE = (
     "(95 %) of noise, of the bias' correction and of all else that the scene says is not exactly known. decision (ISO "
     "14253-1): pass where the value keeps both limits by at least U, fail where it is beyond one by more than U; only "
     "a value whose status is ok is decided. A zone of several numbers (no balloon): the diameter that they need, how "
-    "much larger it may be (95 %), decided by the law of that, which is not normal near 0."
+    "much larger it may be (95 %), decided by the law of that, which is not normal near 0; under the maximum material "
+    "requirement (ISO 2692) its upper limit is the drawing's with what the measured size adds."
 )
 
 
