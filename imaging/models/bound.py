@@ -172,11 +172,12 @@ def response(noise: Noise, image: np.ndarray) -> tuple[Levels, np.ndarray]:
 def bound(pictures: Pictures) -> Errors:
     """The bound for arrays of pictures, one after the other.
 
-    Where things hide or shade each other, and of circles, it is that of each edge by itself.
+    Where things hide or shade each other, and of circles, it is that of each edge by itself. Of a form, a maximum less
+    a minimum, there is no bound: its variance is that of the calibrated model.
     """
     alone = edge_bound(pictures)
     known = alone.measurands
-    if not is_plain(pictures.scene) or known.circles:
+    if not is_plain(pictures.scene) or known.circles or known.seen.forms:
         return alone
     lead, count, edges = alone.variance.shape, len(known.quantities), len(known.view.names)
     lines = np.full((*lead, edges, 2, 2), np.inf)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from imaging.features.locator import reach
+from imaging.features.locator import points_along, reach
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.estimate import Estimate, noisy
 from measure.estimators.thinning import Thinned, Thinning
@@ -22,7 +22,6 @@ from scenes import status
 if TYPE_CHECKING:
     from measure.estimators.canny import CannyLocator
 
-_FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
 _MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
@@ -50,13 +49,11 @@ def by_points(
 
 
 def thinned(caliper: Caliper, scale: float) -> Caliper:
-    """Positions at most 2 scales apart, and not too few: points in between add nothing (their errors are smooth)."""
+    """Positions that are enough (`imaging.features.locator.points_along`)."""
     if caliper.positions.size < 3:
         return caliper
     first, last = caliper.positions[[0, -1]]
-    return replace(
-        caliper, positions=np.linspace(first, last, max(_FEWEST, int(np.ceil((last - first) / (2 * scale))) + 1))
-    )
+    return replace(caliper, positions=np.linspace(first, last, points_along(float(last - first), scale)))
 
 
 def measurable(caliper: Caliper) -> bool:

@@ -101,6 +101,22 @@ def tells_errors(response: sparse.csr_array, clean: np.ndarray, picture: Picture
     return is_linear(*map(np.concatenate, (linear, full, found)))
 
 
+def nearest_tools(picture: Picture, name: str, found: Circles) -> list[tuple[RimTool, np.ndarray] | None]:
+    """Of each image the tool by which a circle was found in it, and its errors (p,) from where that expects it; None
+    where it was not found."""
+    here, tools = unmoved(picture, name), []
+    for errors in found.errors:
+        if not np.isfinite(errors).all():
+            tools.append(None)
+            continue
+        tool, moved = rim_tool(picture, name, here), here
+        if _is_far(tool, errors[None])[0]:
+            moved = _rounded(tool, errors)
+            tool = rim_tool(picture, name, moved)
+        tools.append((tool, errors - np.array(moved)))
+    return tools
+
+
 def unmoved(picture: Picture, name: str) -> tuple[float, ...]:
     each = picture.scene.solid.round(name)
     return (0.0,) * (each.count if isinstance(each, Curved) else 3)
@@ -205,7 +221,7 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         np.stack([along @ one, along @ two], -1)[keep], (design[:, 2] * circle.radius / (2 * speed**2))[keep],
     )  # fmt: skip
     locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain)
-    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve)
+    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve.places, curve)
 
 
 def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:

@@ -51,6 +51,7 @@ class Features:
         """
         parts = [self._lines(station).ravel()]
         parts += [self._circle(station, c) for c in range(len(self.known.circles))]
+        parts.append(np.zeros(len(self.known.seen.forms)))
         return np.concatenate(parts)
 
     @cached_property

@@ -1,0 +1,259 @@
+"""What noise does to the zone that the edge points of one feature seem to need (`scenes.measurands.form`).
+
+The zone is a maximum less a minimum over m points, so that even a perfect feature seems to need one. The points' errors
+are jointly normal: standard deviations from the image model, as of `imaging.models.calibrated`, and correlation
+exp(-d^2 / (4 s^2)) of points d px apart along the edge, s the locator's smoothing scale. What the reference, a line or
+circle by least squares, takes out of them is left out of the zone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN, RimImage, rim
+from imaging.features.limb_outline import limb_outline
+from imaging.features.limbs import limb_rim
+from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kappa2, points_along
+from imaging.features.measurand import Measurands, measurands, normals
+from imaging.features.rim_look import places_around
+from imaging.geometry.projection import edge_points
+from imaging.models.along import Along
+from imaging.models.extremes import Extreme, Law, magnitude, spread
+from imaging.pictures import Pictures
+from scenes import Curved, Quantity
+from scenes.measurands.features import place_of
+from scenes.measurands.form import Reference, reference_of
+
+SPACING = 2.0  # smoothing scales between points: between them errors are smooth
+MOST_PLACES = 64  # times the places that the planner takes on a rim
+_GRID = np.unique(np.round(np.geomspace(5, 1200, 36)).astype(int))  # numbers of points of which laws are tabulated
+
+
+@dataclass(frozen=True, eq=False)
+class FormLaw:
+    """Joint errors of the m points of a feature, and what they do to its zone.
+
+    Attributes
+    ----------
+    covariance : ndarray, shape (m, m)
+        Of the points' distances from their reference, the scene's unit squared.
+    reference : {"line", "circle", "nominal"}
+    """
+
+    covariance: np.ndarray
+    reference: Reference
+
+    @classmethod
+    def beside(cls, covariance: np.ndarray, design: np.ndarray, reference: Reference) -> FormLaw:
+        """From errors of the points' places, of which a least-squares fit of a design (m, k) takes a part."""
+        left = residues(design) if reference != "nominal" else np.eye(len(design))
+        return cls(left @ covariance @ left.T, reference)
+
+    @property
+    def extreme(self) -> Extreme:
+        """The zone that distances (..., m) need: their range, or about the nominal place twice the largest."""
+        return magnitude if self.reference == "nominal" else spread
+
+    @cached_property
+    def noise(self) -> Law:
+        """Of the zone of a feature without form error."""
+        return self.of(np.zeros(len(self.covariance)))
+
+    def of(self, form: np.ndarray) -> Law:
+        """Of the zone of a feature whose points are truly so far from their reference, (m,)."""
+        return Law.of(form, self.covariance, self.extreme)
+
+    @cached_property
+    def apart(self) -> float:
+        """Largest standard deviation of the zone that two points alone need, or one about the nominal place.
+
+        A zone seems smaller than it is by no more than its two outermost points' errors, whatever the feature's form.
+        """
+        squares = np.diag(self.covariance)
+        if self.reference == "nominal":
+            return 2 * float(np.sqrt(squares.max()))
+        return float(np.sqrt(max((squares[:, None] + squares - 2 * self.covariance).max(), 0.0)))
+
+
+def residues(design: np.ndarray) -> np.ndarray:
+    """What a least-squares fit of a design (m, k) leaves of m numbers, (m, m)."""
+    basis = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    return np.eye(len(design)) - basis @ basis.T
+
+
+def thinned(spacing: float, scale: float) -> int:
+    """Which places so far apart, px, are points of a form: every so many-th."""
+    return max(1, int(SPACING * scale / spacing + 1e-9)) if spacing > 0 else 1
+
+
+def form_law(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
+    """Of one picture; None where the feature cannot be measured.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> block = scenes.load("task1").with_(task=None, measurands=[
+    ...     {"name": "front", "kind": "straightness", "features": [{"edge": "e7"}]}])
+    >>> law = form_law(Pictures.of(block, (30, 135), (15, 315)), block.quantities[0])
+    >>> print(f"a straight edge seems to need {law.noise.mean:.3f} cm, below {law.noise.quantile(0.95):.3f} in 95 %")
+    a straight edge seems to need 0.011 cm, below 0.014 in 95 %
+    """
+    return pictures.once(("form", quantity), lambda: _law(pictures, quantity))
+
+
+def form_variances(pictures: Pictures, known: Measurands, rims: list[RimImage]) -> tuple[np.ndarray, ...]:
+    """Variance of each form's size (`Seen.forms`) by noise, where there is no form error, the scene's unit squared.
+
+    Of one picture that of its `FormLaw`; of many that of as many points alike, of the mean of their variances.
+
+    Parameters
+    ----------
+    rims : list of RimImage
+        Of the circles of ``known``.
+    """
+    found = []
+    for quantity in known.seen.forms:
+        if pictures.closely:
+            law = form_law(pictures, quantity)
+            found.append(np.array(np.inf if law is None else law.noise.u**2))
+        elif reference_of(quantity) == "circle" or place_of(quantity.features[0]) in known.circles:
+            found.append(_glanced_rim(pictures, quantity, rims[known.circles.index(place_of(quantity.features[0]))]))
+        else:
+            found.append(_glanced_edge(pictures, quantity))
+    return tuple(found)
+
+
+def _law(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
+    known, name = measurands(pictures), place_of(quantity.features[0])
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return _of_rim(pictures, quantity) if name in known.circles else _of_edge(pictures, quantity)
+
+
+@dataclass(frozen=True, eq=False)
+class _EdgeErrors:
+    """Along the used part of one edge, of pictures (...): `EdgeNodes.t` (..., n), standard deviations of points there
+    (..., n), the scene's unit, length of the part (...), ideal px, and recorded px for an ideal one."""
+
+    t: np.ndarray
+    sigma: np.ndarray
+    length: np.ndarray
+    along: np.ndarray
+
+
+def _edge_errors(pictures: Pictures, quantity: Quantity) -> _EdgeErrors:
+    scene, along = pictures.scene, Along.of(pictures, trimmed=True)
+    known, nodes = along.measurands, along.nodes
+    e = known.view.names.index(place_of(quantity.features[0]))
+    noise = np.broadcast_to(along.noise_variance, along.squared.shape)[..., e, :]
+    squared = along.squared[..., e, :]
+    pick = [np.broadcast_to(part, nodes.t.shape)[..., e, :] for part in (nodes.blur, nodes.across, nodes.along)]
+    variance = kappa2(scene.locator.scale_px, pick[0]) * np.square(pick[1]) * noise / squared
+    places = edge_points(scene.solid, known.view.names, nodes.spatial)[..., e, :, :]
+    unit = 1 / known.seen.per_unit(quantity.features[0], places, normals(known.view)[..., e, :])
+    length = nodes.length[..., e, 0]
+    weak = ~((squared / noise).mean(-1) >= MIN_CONTRAST**2) | ~(length >= MIN_USABLE) | ~known.view.visible[..., e]
+    return _EdgeErrors(nodes.t[..., e, :], np.sqrt(variance) * unit, np.where(weak, np.nan, length), pick[2].mean(-1))
+
+
+def _of_edge(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
+    found, scale = _edge_errors(pictures, quantity), pictures.scene.locator.scale_px
+    if not (np.isfinite(found.length) and np.isfinite(found.sigma).all()):
+        return None
+    at = np.linspace(-found.length / 2, found.length / 2, points_along(float(found.length), scale))
+    sigma = np.interp(at, found.t, found.sigma)
+    apart = correlation((at[:, None] - at) * found.along, scale)
+    return FormLaw.beside(sigma[:, None] * sigma * apart, np.stack([np.ones(at.size), at], -1), reference_of(quantity))
+
+
+def _glanced_edge(pictures: Pictures, quantity: Quantity) -> np.ndarray:
+    found, scale = _edge_errors(pictures, quantity), pictures.scene.locator.scale_px
+    count = found.length * found.along / (SPACING * scale) + 1
+    return (found.sigma**2).mean(-1) * _tabulated(count, reference_of(quantity), False)
+
+
+def _of_rim(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
+    """As `measure.features.rims` and `limbs` place their points."""
+    name, scene = place_of(quantity.features[0]), pictures.scene
+    each, scale = scene.solid.round(name), scene.locator.scale_px
+    image = limb_rim(pictures, each) if isinstance(each, Curved) else rim(pictures, each)
+    if _is_lost(image):
+        return None
+    count, at = _places(pictures, each, image)
+    used, sigma = _rim_errors(pictures, image)
+    used, design = used[at], image.design[at]
+    arc = image.arc[at] * (image.arc.size / count)
+    where = np.cumsum(arc) - arc
+    step = thinned(float(arc[used].mean()), scale)
+    pick = np.flatnonzero(used)[::step]
+    apart = np.abs(where[pick, None] - where[pick])
+    apart = np.minimum(apart, arc.sum() - apart) if image.turn == 1 else apart
+    scaled = design[pick] / design[pick, 2:3]
+    sigma = sigma[at][pick]
+    covariance = sigma[:, None] * sigma * correlation(apart, scale)
+    return FormLaw.beside(covariance, scaled[:, :3], reference_of(quantity))
+
+
+def _places(pictures: Pictures, each, image: RimImage) -> tuple[int, np.ndarray]:
+    """How many places are measured around a rim, and which of the planner's is nearest to each."""
+    scale, have = pictures.scene.locator.scale_px, image.arc.size
+    if isinstance(each, Curved):
+        length = float(np.nansum(limb_outline(each, pictures.sensors, pictures.scene.camera).arc))
+        count = have * int(np.clip(np.ceil(length / (SPACING * scale * have)), 1, MOST_PLACES))
+    elif each.ends is None:
+        count = places_around(pictures, each, SPACING * scale, MOST_PLACES)
+    else:
+        count = have
+    return count, (np.arange(count) * have // count) % have
+
+
+def _rim_errors(pictures: Pictures, image: RimImage) -> tuple[np.ndarray, np.ndarray]:
+    """Which points of a rim are used, and their standard deviations along the radius, the scene's unit, (..., n)."""
+    scene = pictures.scene
+    used = (image.clear | image.crowded[..., None]) & (image.squared >= MIN_CONTRAST**2 * image.noise_variance)
+    variance = kappa2(scene.locator.scale_px, scene.camera.blur_px) * image.noise_variance / image.squared
+    return used, np.sqrt(variance) / np.abs(image.design[..., 2])
+
+
+def _is_lost(image: RimImage) -> np.ndarray:
+    """Where too little of a rim is there, bool (...)."""
+    seen = image.squared > 0
+    return (image.left < LEAST_SEEN) | (image.turn * (seen & (image.clear | image.crowded[..., None])).mean(-1)
+                                        < LEAST_CLEAR * LEAST_SEEN)  # fmt: skip
+
+
+def _glanced_rim(pictures: Pictures, quantity: Quantity, image: RimImage) -> np.ndarray:
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        used, sigma = _rim_errors(pictures, image)
+        length = np.where(used, image.arc, 0.0).sum(-1)
+        mean = np.where(used, sigma**2, 0.0).sum(-1) / used.sum(-1)
+        count = length / (SPACING * pictures.scene.locator.scale_px)
+        found = mean * _tabulated(count, reference_of(quantity), image.turn == 1)
+    return np.where(_is_lost(image) | ~np.isfinite(found), np.inf, found)
+
+
+def _tabulated(count: np.ndarray, reference: Reference, closed: bool) -> np.ndarray:
+    """Variance of the zone of so many points (...) of variance 1, `SPACING` apart; infinite where there are none."""
+    known = np.array([_unit_variance(int(m), reference, closed) for m in _GRID[: _last(count)]])
+    told = np.interp(np.log(np.maximum(np.nan_to_num(count), 1.0)), np.log(_GRID[: known.size]), known)
+    return np.where(np.isfinite(count), told, np.inf)
+
+
+def _last(count: np.ndarray) -> int:
+    """How many of `_GRID` are needed."""
+    largest = np.nanmax(np.where(np.isfinite(count), count, 0.0), initial=0.0)
+    return min(int(np.searchsorted(_GRID, largest)) + 1, _GRID.size)
+
+
+@lru_cache(maxsize=256)
+def _unit_variance(count: int, reference: Reference, closed: bool) -> float:
+    at = np.arange(count)
+    apart = np.abs(at[:, None] - at)
+    apart = np.minimum(apart, count - apart) if closed else apart
+    turn = 2 * np.pi * at / count
+    design = np.stack([np.ones(count), at], -1)
+    if reference == "circle":
+        design = np.stack([np.cos(turn), np.sin(turn), np.ones(count)], -1)
+    return FormLaw.beside(correlation(SPACING * apart, 1.0), design, reference).noise.u ** 2
