@@ -10,6 +10,7 @@ from uncertainties import covariance_matrix
 
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.conformity import Decision
+from planner.uncertainty.forms import FormSize
 from planner.uncertainty.zones import ZoneSize
 from scenes import status
 from scenes.measurands.zone import Zone
@@ -20,19 +21,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredZone:
-    """A zone of several numbers, which decide together.
+    """A zone of several numbers, which decide together, or of all points of a feature.
 
     Attributes
     ----------
     zone : Zone
-    size : ZoneSize
+    size : ZoneSize or FormSize
         What is known of the size that the part needs, the scene's unit; NaN within where something is not measured.
     unit, status : str
         The worst status of its numbers.
     """
 
     zone: Zone
-    size: ZoneSize
+    size: ZoneSize | FormSize
     unit: str
     status: str
 
@@ -56,7 +57,7 @@ class MeasuredZone:
 
 
 def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tuple[MeasuredZone, ...]:
-    """Those of one picture's geometric tolerances that are about several numbers; one number is decided by itself.
+    """Those of one picture's geometric tolerances that no single normal number decides.
 
     ``known`` is the budget of what was measured; without it, or where it leaves out a number, nothing is known.
     """
@@ -64,11 +65,26 @@ def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tu
     for zone in found.picture.scene.zones:
         if zone.is_joint:
             rows = [names.index(name) for name in zone.parts]
-            covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.parts)
-            size = ZoneSize((found.value - found.nominal)[rows], covariance, zone.factor)
+            size = _form(found, known, rows[0]) if zone.is_form else _joint(found, known, zone, rows)
             state = status.worst(*(str(found.status[k]) for k in rows))
             made.append(MeasuredZone(zone, size, found.units[rows[0]], state))
     return tuple(made)
+
+
+def _joint(found: measure.Measurements, known: SceneBudget | None, zone: Zone, rows: list[int]) -> ZoneSize:
+    covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.parts)
+    return ZoneSize((found.value - found.nominal)[rows], covariance, zone.factor)
+
+
+def _form(found: measure.Measurements, known: SceneBudget | None, row: int) -> FormSize:
+    """Of the row-th number; the form's points, and what else is not exactly known."""
+    name, value = found.names[row], float(found.value[row])
+    (points,) = found.forms[name]
+    if points is None or known is None or name not in {each.name for each in known}:
+        return FormSize(value, np.nan, np.nan, None)
+    u = known[name].u
+    beside = float(np.sqrt(max(u**2 - float(found.covariance[row, row]), 0.0)))
+    return FormSize(value, u, points.size - float(found.bias[row]), points.law, beside)
 
 
 def _covariance(noise: np.ndarray, known: SceneBudget | None, names: tuple[str, ...]) -> np.ndarray:

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN, RimImage, rim
+from imaging.features.circles import LEAST_SEEN, RimImage, rim
 from imaging.features.limb_outline import limb_outline
 from imaging.features.limbs import limb_rim
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kappa2, points_along
@@ -23,12 +23,15 @@ from imaging.geometry.projection import edge_points
 from imaging.models.along import Along
 from imaging.models.extremes import Extreme, Law, magnitude, spread
 from imaging.pictures import Pictures
-from scenes import Curved, Quantity
+from scenes import Circle, Curved, Quantity
 from scenes.measurands.features import place_of
 from scenes.measurands.form import Reference, reference_of
 
 SPACING = 2.0  # smoothing scales between points: between them errors are smooth
 MOST_PLACES = 64  # times the places that the planner takes on a rim
+CLEAREST = 2 * MIN_CONTRAST  # contrast / noise that a point needs: an extreme shows what in a mean averages out
+LEAST_CLEAR = 0.5  # part of the places that must have it
+_WORST = 8.0  # exponent of the mean of unequal standard deviations that an extreme of many points goes with
 _GRID = np.unique(np.round(np.geomspace(5, 1200, 36)).astype(int))  # numbers of points of which laws are tabulated
 
 
@@ -135,7 +138,8 @@ def _law(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
 @dataclass(frozen=True, eq=False)
 class _EdgeErrors:
     """Along the used part of one edge, of pictures (...): `EdgeNodes.t` (..., n), standard deviations of points there
-    (..., n), the scene's unit, length of the part (...), ideal px, and recorded px for an ideal one."""
+    (..., n), the scene's unit, NaN without enough contrast, length of the part (...), ideal px, and recorded px for an
+    ideal one."""
 
     t: np.ndarray
     sigma: np.ndarray
@@ -154,24 +158,29 @@ def _edge_errors(pictures: Pictures, quantity: Quantity) -> _EdgeErrors:
     places = edge_points(scene.solid, known.view.names, nodes.spatial)[..., e, :, :]
     unit = 1 / known.seen.per_unit(quantity.features[0], places, normals(known.view)[..., e, :])
     length = nodes.length[..., e, 0]
-    weak = ~((squared / noise).mean(-1) >= MIN_CONTRAST**2) | ~(length >= MIN_USABLE) | ~known.view.visible[..., e]
-    return _EdgeErrors(nodes.t[..., e, :], np.sqrt(variance) * unit, np.where(weak, np.nan, length), pick[2].mean(-1))
+    clear = squared >= CLEAREST**2 * noise
+    lost = (clear.mean(-1) < LEAST_CLEAR) | ~(length >= MIN_USABLE) | ~known.view.visible[..., e]
+    sigma = np.where(clear, np.sqrt(variance) * unit, np.nan)
+    return _EdgeErrors(nodes.t[..., e, :], sigma, np.where(lost, np.nan, length), pick[2].mean(-1))
 
 
 def _of_edge(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
     found, scale = _edge_errors(pictures, quantity), pictures.scene.locator.scale_px
-    if not (np.isfinite(found.length) and np.isfinite(found.sigma).all()):
+    if not np.isfinite(found.length):
         return None
     at = np.linspace(-found.length / 2, found.length / 2, points_along(float(found.length), scale))
-    sigma = np.interp(at, found.t, found.sigma)
+    clear = np.isfinite(found.sigma)
+    at = at[np.interp(at, found.t, 1.0 * clear) >= LEAST_CLEAR]
+    sigma = np.interp(at, found.t[clear], found.sigma[clear])
     apart = correlation((at[:, None] - at) * found.along, scale)
     return FormLaw.beside(sigma[:, None] * sigma * apart, np.stack([np.ones(at.size), at], -1), reference_of(quantity))
 
 
 def _glanced_edge(pictures: Pictures, quantity: Quantity) -> np.ndarray:
     found, scale = _edge_errors(pictures, quantity), pictures.scene.locator.scale_px
-    count = found.length * found.along / (SPACING * scale) + 1
-    return (found.sigma**2).mean(-1) * _tabulated(count, reference_of(quantity), False)
+    clear = np.isfinite(found.sigma)
+    count = found.length * found.along * clear.mean(-1) / (SPACING * scale) + 1
+    return _worst(found.sigma, clear) * _tabulated(count, reference_of(quantity), False)
 
 
 def _of_rim(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
@@ -181,57 +190,66 @@ def _of_rim(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
     image = limb_rim(pictures, each) if isinstance(each, Curved) else rim(pictures, each)
     if _is_lost(image):
         return None
-    count, at = _places(pictures, each, image)
+    count = _places(pictures, each, image)
     used, sigma = _rim_errors(pictures, image)
-    used, design = used[at], image.design[at]
-    arc = image.arc[at] * (image.arc.size / count)
+    at = np.arange(count) * image.arc.size / count
+    nearest = np.rint(at).astype(int) % image.arc.size
+    arc = image.arc[nearest] * (image.arc.size / count)
     where = np.cumsum(arc) - arc
-    step = thinned(float(arc[used].mean()), scale)
-    pick = np.flatnonzero(used)[::step]
+    step = thinned(float(arc[used[nearest]].mean()), scale)
+    pick = np.flatnonzero(used[nearest])[::step]
     apart = np.abs(where[pick, None] - where[pick])
     apart = np.minimum(apart, arc.sum() - apart) if image.turn == 1 else apart
-    scaled = design[pick] / design[pick, 2:3]
-    sigma = sigma[at][pick]
+    design = np.stack([_between(column, used, at[pick]) for column in image.design.T[:3]], -1)
+    sigma = _between(sigma, used, at[pick])
     covariance = sigma[:, None] * sigma * correlation(apart, scale)
-    return FormLaw.beside(covariance, scaled[:, :3], reference_of(quantity))
+    return FormLaw.beside(covariance, design / design[:, 2:3], reference_of(quantity))
 
 
-def _places(pictures: Pictures, each, image: RimImage) -> tuple[int, np.ndarray]:
-    """How many places are measured around a rim, and which of the planner's is nearest to each."""
+def _between(values: np.ndarray, used: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values (n,) around a rim, of which some are known, at fractions of its places (m,)."""
+    return np.interp(at, np.flatnonzero(used), values[used], period=used.size)
+
+
+def _places(pictures: Pictures, each: Circle | Curved, image: RimImage) -> int:
+    """How many places are measured around a rim."""
     scale, have = pictures.scene.locator.scale_px, image.arc.size
     if isinstance(each, Curved):
         length = float(np.nansum(limb_outline(each, pictures.sensors, pictures.scene.camera).arc))
-        count = have * int(np.clip(np.ceil(length / (SPACING * scale * have)), 1, MOST_PLACES))
-    elif each.ends is None:
-        count = places_around(pictures, each, SPACING * scale, MOST_PLACES)
-    else:
-        count = have
-    return count, (np.arange(count) * have // count) % have
+        return have * int(np.clip(np.ceil(length / (SPACING * scale * have)), 1, MOST_PLACES))
+    return have if each.ends is not None else places_around(pictures, each, SPACING * scale, MOST_PLACES)
 
 
 def _rim_errors(pictures: Pictures, image: RimImage) -> tuple[np.ndarray, np.ndarray]:
     """Which points of a rim are used, and their standard deviations along the radius, the scene's unit, (..., n)."""
     scene = pictures.scene
-    used = (image.clear | image.crowded[..., None]) & (image.squared >= MIN_CONTRAST**2 * image.noise_variance)
+    used = (image.clear | image.crowded[..., None]) & (image.squared >= CLEAREST**2 * image.noise_variance)
     variance = kappa2(scene.locator.scale_px, scene.camera.blur_px) * image.noise_variance / image.squared
     return used, np.sqrt(variance) / np.abs(image.design[..., 2])
 
 
 def _is_lost(image: RimImage) -> np.ndarray:
-    """Where too little of a rim is there, bool (...)."""
-    seen = image.squared > 0
-    return (image.left < LEAST_SEEN) | (image.turn * (seen & (image.clear | image.crowded[..., None])).mean(-1)
-                                        < LEAST_CLEAR * LEAST_SEEN)  # fmt: skip
+    """Where too little of a rim is there, or too much of it without contrast, bool (...)."""
+    taken = image.clear | image.crowded[..., None]
+    weak = taken & (image.squared >= MIN_CONTRAST**2 * image.noise_variance)
+    used = taken & (image.squared >= CLEAREST**2 * image.noise_variance)
+    few = image.turn * used.mean(-1) < LEAST_SEEN
+    return (image.left < LEAST_SEEN) | few | (used.mean(-1) < LEAST_CLEAR * weak.mean(-1))
 
 
 def _glanced_rim(pictures: Pictures, quantity: Quantity, image: RimImage) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         used, sigma = _rim_errors(pictures, image)
         length = np.where(used, image.arc, 0.0).sum(-1)
-        mean = np.where(used, sigma**2, 0.0).sum(-1) / used.sum(-1)
         count = length / (SPACING * pictures.scene.locator.scale_px)
-        found = mean * _tabulated(count, reference_of(quantity), image.turn == 1)
+        found = _worst(sigma, used) * _tabulated(count, reference_of(quantity), image.turn == 1)
     return np.where(_is_lost(image) | ~np.isfinite(found), np.inf, found)
+
+
+def _worst(sigma: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Mean of the squares of standard deviations (..., n) of the used points, of which the largest count most."""
+    power = np.where(used, sigma, 0.0) ** _WORST
+    return (power.sum(-1) / used.sum(-1)) ** (2 / _WORST)
 
 
 def _tabulated(count: np.ndarray, reference: Reference, closed: bool) -> np.ndarray:

@@ -13,9 +13,8 @@ from functools import lru_cache
 import numpy as np
 from scipy import special
 
-from imaging.features.locator import MIN_CONTRAST
 from imaging.features.measurand import measurands, normals
-from imaging.models.form_law import FormLaw, residues, thinned
+from imaging.models.form_law import CLEAREST, LEAST_CLEAR, FormLaw, residues, thinned
 from imaging.pictures import Pictures
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.gradient import gradient_locator
@@ -32,7 +31,6 @@ from scenes.measurands.features import place_of
 from scenes.measurands.form import Reference, reference_of
 
 _GRID = 0.5  # px to which the place of an edge is rounded where it is looked for, so that images can share it
-_MIN_FOUND = 0.7  # part of the places at which a point must be found
 _SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
 _GAP = 3.0  # times the usual way between places, that a rim without gaps may have
 _NONE = 1e-6  # part of the largest variance of a wave: less is rounding
@@ -163,10 +161,12 @@ def _measured(image: np.ndarray, tool: FormTool) -> tuple[FoundForm | None, str]
     used = image.reshape(1, -1)[:, tool.locator.pixels]
     points = tool.locator.locate_each_in(used)
     offset, contrast = points.offset[0, tool.pick], points.contrast[0, tool.pick]
-    valid = points.valid[0, tool.pick] & (contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance))
-    if valid.mean() < _MIN_FOUND or valid.sum() <= tool.design.shape[1] + 1:
+    valid = points.valid[0, tool.pick]
+    contrast, noise = _smooth(np.where(valid, contrast, 0.0)), _noise(used[0], tool)
+    valid &= contrast >= CLEAREST * np.sqrt(noise)
+    if valid.mean() < LEAST_CLEAR or valid.sum() <= tool.design.shape[1] + 1:
         return None, status.LOW_CONTRAST
-    errors = _errors(used[0], tool, contrast, valid)
+    errors = _errors(used[0], tool, contrast, np.flatnonzero(valid))
     law = FormLaw.beside(errors, tool.design[valid], tool.reference)
     at = ((offset + tool.inward) * tool.unit)[valid]
     if tool.reference != "nominal":
@@ -174,15 +174,29 @@ def _measured(image: np.ndarray, tool: FormTool) -> tuple[FoundForm | None, str]
     return FoundForm(at, law, tool.is_closed and bool(valid.all())), tool.state
 
 
-def _errors(used: np.ndarray, tool: FormTool, contrast: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """Covariance of the valid points at the contrast that an image of pixels (P,) shows, the scene's unit squared."""
-    at = np.flatnonzero(valid)
-    number = np.convolve(np.ones(at.size), np.ones(_SMOOTH), "same")
-    smooth = np.convolve(contrast[at], np.ones(_SMOOTH), "same") / number
+def _smooth(contrast: np.ndarray) -> np.ndarray:
+    """Contrasts (m,) averaged over neighbouring places."""
+    some = np.ones(min(_SMOOTH, contrast.size))
+    return np.convolve(contrast, some, "same") / np.convolve(np.ones(contrast.size), some, "same")
+
+
+def _variance(used: np.ndarray, tool: FormTool) -> np.ndarray:
+    """Of the noise of an image's pixels (P,), grey levels^2."""
+    variance = tool.optics.noise_at(used[None])
+    return np.full(used.size, tool.optics.noise_variance) if variance is None else variance[0]
+
+
+def _noise(used: np.ndarray, tool: FormTool) -> np.ndarray:
+    """Variance of the noise at each point (m,), as its crossing feels it, grey levels^2."""
+    weights = tool.locator.unit_response()[tool.pick].power(2)
+    return weights @ _variance(used, tool) / weights.sum(1)
+
+
+def _errors(used: np.ndarray, tool: FormTool, contrast: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Covariance of some of the points at their contrasts (m,) in an image of pixels (P,), the scene's unit squared."""
     response = tool.locator.unit_response()[tool.pick[at]]
-    variance = tool.optics.noise_at(used)
-    weighted = response.multiply(tool.optics.noise_variance if variance is None else variance[None]).tocsr()
-    scale = tool.unit[at] / smooth
+    scale = tool.unit[at] / contrast[at]
+    weighted = response.multiply(_variance(used, tool)[None]).tocsr()
     return scale[:, None] * scale * (weighted @ response.T).toarray()
 
 

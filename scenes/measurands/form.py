@@ -21,6 +21,7 @@ class Form(MeasurandKind):
 
     nominals = 0
     zone = 1.0
+    is_form = True
     reference: ClassVar[Reference]
     """From what the points' distances are taken: a least-squares line or circle, or the nominal place."""
 

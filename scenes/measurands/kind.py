@@ -60,6 +60,8 @@ class MeasurandKind:
 
     0 for a dimension. ``tolerance`` of a measurand is then the zone's diameter or width.
     """
+    is_form: ClassVar[bool] = False
+    """Whether it is about all points of a feature (`scenes.measurands.form`)."""
 
     def takes(self, features: tuple) -> bool:
         """Whether these features, in their order, make one."""
@@ -109,7 +111,8 @@ class MeasurandKind:
         if not self.zone:
             return None
         names = tuple(f"{measurand.name}.{part}" for part in self.parts) or (measurand.name,)
-        return Zone(measurand.name, measurand.kind, names, self.zone, measurand.tolerance and measurand.tolerance.plus)
+        size = measurand.tolerance and measurand.tolerance.plus
+        return Zone(measurand.name, measurand.kind, names, self.zone, size, self.is_form)
 
     def in_image(self, seen: Any, quantity: Quantity) -> Evaluated:
         """Value and derivatives in the image: px, or degrees."""
