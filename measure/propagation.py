@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from imaging.models.bias import MOST
+from imaging.models.extremes import with_extremes
 from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features import arranged
@@ -131,7 +132,10 @@ def propagate(
     errors = (rows.multiply(noise).tocsr() @ rows.T).toarray()
     errors[np.diag_indices(len(errors))] += _of_forms(found)
     gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
-    image, plane = (_covariance(gradient, errors, state) for gradient in gradients)
+    image, plane = (
+        with_extremes(found.known.quantities, part.value[0], gradient, _covariance(gradient, errors, state))[1]
+        for gradient, part in zip(gradients, (found.image, found.plane), strict=True)
+    )
     responses = [sparse.csr_array(gradient) @ rows for gradient in gradients]
     uneven = Unevenness.about(picture, responses[1]) if picture.lights and picture.scene.textures else None
     shifts = np.zeros(len(state))

@@ -11,6 +11,7 @@ from imaging.features.kinds import Evaluated, in_image, on_plane
 from imaging.features.measurand import Measurands, dense, measurands
 from imaging.features.seen import Seen
 from imaging.geometry.lens import image_centre
+from imaging.models.extremes import extremes_of, with_extremes
 from imaging.pictures import Pictures
 from measure.features.corners import intersect
 from measure.features.forms import Forms, find_form
@@ -164,7 +165,11 @@ def values(seen: Seen, quantities: tuple[Quantity, ...], kind, errors: np.ndarra
         found: list[Evaluated] = [kind(seen, quantity) for quantity in quantities]
         gradient = dense(found, (count,), seen.count)
         value = np.stack([np.broadcast_to(each.value, count) for each in found], -1)
-        return Values(value, gradient, _spread(gradient, errors))
+        covariance = _spread(gradient, errors)
+        if any(True for _ in extremes_of(quantities)):
+            each = [with_extremes(quantities, *one) for one in zip(value, gradient, covariance, strict=True)]
+            gradient, covariance = (np.array(part) for part in zip(*each, strict=True))
+        return Values(value, gradient, covariance)
 
 
 def _spread(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
@@ -200,7 +205,7 @@ def _states(
         columns = [shape.counted[:, names.index(name)] for name in quantity.edges if name in names]
         columns += [circles[known.circles.index(name)].state for name in quantity.edges if name in known.circles]
         columns += [_crossing(shape, names, each) for each in quantity.crossings]
-        columns += [forms[each].state for each in (quantity,) if each in forms]
+        columns += [forms[each].state for each in (quantity, *quantity.terms) if each in forms]
         if any(name in names for name in quantity.edges):
             columns.append(shape.whole)
         found[:, m] = [status.worst(*row) for row in zip(*columns, strict=True)]

@@ -248,8 +248,7 @@ def predict(
     edges = _edges(evaluated, clutter, off)
     if glance:
         told, edges = (tuple(map(_glanced_at, each)) for each in (told, edges))
-    gradients = evaluated.measurands.gradient, evaluated.measurands.gradient_object
-    covariance, covariance_object = (evaluated.covariance(gradient) for gradient in gradients)
+    covariance, covariance_object = (evaluated.jointly(in_object=each) for each in (False, True))
     first = ("kind", "value_image", "value_object", "variance_image", "variance_object", "bias_image")
     return Prediction(
         model=model,

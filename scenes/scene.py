@@ -161,7 +161,7 @@ class Scene(Model):
 
     def _repr_html_(self) -> str:
         rows = [
-            {"measurand": each.name, "kind": each.kind, "of": " to ".join(map(place_of, each.features)),
+            {"measurand": each.name, "kind": each.kind, "of": ", ".join(term.name for term in each.terms) or " to ".join(map(place_of, each.features)),
              "unit": self.unit_of(each), "plus": each.tolerance and each.tolerance.plus,
              "minus": each.tolerance and each.tolerance.minus}
             for each in quantities_of(self.task, self.measurands)

@@ -20,6 +20,7 @@ from imaging.pictures import Pictures
 from scenes import Centre, Corner, Edge, Scene, Solid, Wall
 from scenes.measurands.features import place_of
 from scenes.measurands.form import forms_of
+from scenes.measurands.kinds import MEASURANDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +80,8 @@ def circles(scene: Scene) -> tuple[str, ...]:
 
 def lines_alone(scene: Scene) -> bool:
     """Whether straight edges' lines tell all quantities, to first order."""
-    return not circles(scene) and not forms_of(scene.quantities)
+    extreme = any(MEASURANDS[each.kind].extreme for each in scene.quantities)
+    return not circles(scene) and not forms_of(scene.quantities) and not extreme
 
 
 def corner_features(scene: Scene) -> tuple[Corner, ...]:

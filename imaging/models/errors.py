@@ -15,6 +15,7 @@ import numpy as np
 from imaging.features.circles import RimImage, rim
 from imaging.features.limbs import limb_rim
 from imaging.features.measurand import Measurands, measurands
+from imaging.models.extremes import Law, extremes_of, largest_moments, with_extremes
 from imaging.models.form_law import form_variances
 from imaging.pictures import Pictures
 from scenes import Circle, Curved, Quantity
@@ -63,12 +64,13 @@ class Errors:
     @cached_property
     def variances(self) -> np.ndarray:
         """Of all quantities in the image, px^2 (degrees^2), shape (..., M); infinite where not measurable."""
-        return self.joint[0] if self.joint else _variances(self, self.measurands.gradient)
+        return self.joint[0] if self.joint else _variances(self, self.measurands.gradient, self.measurands.value)
 
     @cached_property
     def variances_object(self) -> np.ndarray:
         """The same in the object, the scene's unit squared (degrees^2)."""
-        return self.joint[1] if self.joint else _variances(self, self.measurands.gradient_object)
+        known = self.measurands
+        return self.joint[1] if self.joint else _variances(self, known.gradient_object, known.value_object)
 
     @property
     def variance(self) -> np.ndarray:
@@ -91,6 +93,13 @@ class Errors:
         names = [*self.measurands.view.names, *self.measurands.circles]
         each = [*np.moveaxis(edges, -1, 0), *circles]
         return {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed}
+
+    def jointly(self, *, in_object: bool) -> np.ndarray:
+        """Joint covariance (M, M) of all quantities of one picture in the object or in the image, extremes by their
+        laws; infinite where not measurable."""
+        known = self.measurands
+        gradient, values = (known.gradient_object, known.value_object) if in_object else (known.gradient, known.value)
+        return with_extremes(known.quantities, values, gradient, self.covariance(gradient))[1]
 
     def covariance(self, gradient: np.ndarray) -> np.ndarray:
         """Joint covariance (..., M, M) of quantities with a gradient (..., M, q); infinite where not measurable.
@@ -136,10 +145,22 @@ def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> RimIm
     return limb_rim(pictures, each) if isinstance(each, Curved) else rim(pictures, each, fall_off=fall_off)
 
 
-def _variances(errors: Errors, gradient: np.ndarray) -> np.ndarray:
-    """Variances (..., M) of quantities with a gradient (..., M, q)."""
-    needs = errors.measurands.depends()
-    return np.stack([_variance(errors, gradient[..., m, :], needs[m]) for m in range(len(needs))], -1)
+def _variances(errors: Errors, gradient: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Variances (..., M) of quantities of some values (..., M) with a gradient (..., M, q)."""
+    needs, quantities = errors.measurands.depends(), errors.measurands.quantities
+    found = np.stack([_variance(errors, gradient[..., m, :], needs[m]) for m in range(len(needs))], -1)
+    for m, rows, sign in extremes_of(quantities):
+        joint = errors.covariance(gradient[..., rows, :])
+        if joint.ndim == 2 and np.isfinite(joint).all():
+            told = Law.of(sign * values[rows], joint, _largest).u ** 2
+        else:
+            told = largest_moments(sign * values[..., rows], joint)[1]
+        found[..., m] = np.where(np.isfinite(found[..., m]) & np.isfinite(told), told, np.inf)
+    return found
+
+
+def _largest(numbers: np.ndarray) -> np.ndarray:
+    return numbers.max(-1)
 
 
 def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = None) -> np.ndarray:

@@ -6,14 +6,18 @@ scrambled Sobol sequence, so that what is told of a picture is told alike each t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy import special, stats
 
+from scenes import Quantity
+from scenes.measurands.kinds import MEASURANDS
+
 DRAWS = 8192  # a power of 2, as Sobol's sequence wants
+_ROOT = np.sqrt(2 * np.pi)
 Extreme = Callable[[np.ndarray], np.ndarray]
 """Of numbers (..., m) along the last axis."""
 
@@ -62,6 +66,69 @@ class Law:
     def below(self, value: float) -> float:
         """Probability of at most so much."""
         return float(np.searchsorted(self._ordered, value, side="right") / self._ordered.size)
+
+
+def extremes_of(quantities: Sequence[Quantity]) -> Iterator[tuple[int, list[int], int]]:
+    """Of each quantity that is an extreme of others its place, theirs, and +1 for the largest, -1 for the smallest."""
+    names = [quantity.name for quantity in quantities]
+    for m, quantity in enumerate(quantities):
+        if MEASURANDS[quantity.kind].extreme:
+            yield m, [names.index(term.name) for term in quantity.terms], MEASURANDS[quantity.kind].extreme
+
+
+def with_extremes(
+    quantities: Sequence[Quantity], values: np.ndarray, gradient: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (M, q) and covariance (M, M) in which extremes among M quantities have their own law.
+
+    The covariance of the largest with another normal number is that of each with it, times the probability that it is
+    the largest (Stein's lemma); its variance that of the draws.
+
+    Parameters
+    ----------
+    values : ndarray, shape (M,)
+        About which the numbers are normal.
+    gradient, covariance : ndarray, shapes (M, q) and (M, M)
+        Of the numbers; of extremes whatever they are.
+    """
+    gradient, covariance = gradient.copy(), covariance.copy()
+    for m, rows, sign in extremes_of(quantities):
+        part = covariance[np.ix_(rows, rows)]
+        if not (np.isfinite(values[rows]).all() and np.isfinite(part).all()):
+            continue
+        each = sign * values[rows] + drawn(part)
+        shares = np.bincount(each.argmax(1), minlength=len(rows)) / len(each)
+        gradient[m] = shares @ gradient[rows]
+        with np.errstate(invalid="ignore"):
+            covariance[m] = covariance[:, m] = shares @ covariance[rows]
+        covariance[m, m] = each.max(1).var()
+    return gradient, covariance
+
+
+def largest_moments(mean: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance (...) of the largest of n jointly normal numbers, means (..., n), covariance (..., n, n).
+
+    Clark (1961): exact of two; of more, one after the other, as if the largest of those before were normal.
+
+    Examples
+    --------
+    >>> [round(float(each), 4) for each in largest_moments(np.zeros(2), np.eye(2))]
+    [0.5642, 0.6817]
+    """
+    best, square = mean[..., 0], covariance[..., 0, 0]
+    beside = covariance[..., 0, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for k in range(1, mean.shape[-1]):
+            other, variance = mean[..., k], covariance[..., k, k]
+            apart = np.sqrt(np.maximum(square + variance - 2 * beside[..., k], 0.0))
+            away = np.where(apart > 0, (best - other) / apart, np.where(best >= other, np.inf, -np.inf))
+            first, second, density = special.ndtr(away), special.ndtr(-away), np.exp(-(away**2) / 2) / _ROOT
+            bump = np.where(apart > 0, apart * density, 0.0)
+            new = best * first + other * second + bump
+            moment = (square + best**2) * first + (variance + other**2) * second + (best + other) * bump
+            best, square = new, np.maximum(moment - new**2, 0.0)
+            beside = first[..., None] * beside + second[..., None] * covariance[..., k, :]
+    return best, square
 
 
 def drawn(covariance: np.ndarray) -> np.ndarray:

@@ -63,6 +63,12 @@ class MeasurandKind:
     is_form: ClassVar[bool] = False
     """Whether it is about all points of a feature (`scenes.measurands.form`)."""
 
+    is_chain: ClassVar[bool] = False
+    """Whether it is of other measurands' numbers (`scenes.measurands.chain`)."""
+
+    extreme: ClassVar[int] = 0
+    """Of a chain +1 where it is the largest of its numbers, -1 where it is the smallest: not normal if several may be."""
+
     def takes(self, features: tuple) -> bool:
         """Whether these features, in their order, make one."""
         return any(
