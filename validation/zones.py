@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from uncertainties import covariance_matrix
 
+from imaging.models.extremes import extremes_of
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.conformity import Decision
+from planner.uncertainty.extremes import ExtremeValue
 from planner.uncertainty.forms import FormSize
 from planner.uncertainty.zones import ZoneSize
 from scenes import status
@@ -71,6 +73,16 @@ def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tu
     return tuple(made)
 
 
+def measured_extremes(found: measure.Measurements, known: SceneBudget | None) -> dict[str, ExtremeValue]:
+    """Of one picture's numbers those that are the largest or the smallest of others, by name."""
+    told = {}
+    for m, rows, sign in extremes_of(found.quantities):
+        names = tuple(found.names[k] for k in rows)
+        covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, names)
+        told[found.names[m]] = ExtremeValue(found.value[rows], covariance, sign)
+    return told
+
+
 def _joint(found: measure.Measurements, known: SceneBudget | None, zone: Zone, rows: list[int]) -> ZoneSize:
     covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.parts)
     return ZoneSize((found.value - found.nominal)[rows], covariance, zone.factor)
@@ -84,7 +96,7 @@ def _form(found: measure.Measurements, known: SceneBudget | None, row: int) -> F
         return FormSize(value, np.nan, np.nan, None)
     u = known[name].u
     beside = float(np.sqrt(max(u**2 - float(found.covariance[row, row]), 0.0)))
-    return FormSize(value, u, points.size - float(found.bias[row]), points.law, beside)
+    return FormSize(max(value, 0.0), u, points.size - float(found.bias[row]), points.law, beside)
 
 
 def _covariance(noise: np.ndarray, known: SceneBudget | None, names: tuple[str, ...]) -> np.ndarray:
