@@ -193,7 +193,7 @@ def bound(pictures: Pictures) -> Errors:
         return a * a * lines[..., 0, 0] + 2 * a * b * lines[..., 0, 1] + b * b * lines[..., 1, 1]
 
     joint = variances, variances_object
-    return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), (), joint)
+    return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), joint=joint)
 
 
 def _unit(known: Measurands) -> np.ndarray:

@@ -44,16 +44,19 @@ class FormLaw:
     covariance : ndarray, shape (m, m)
         Of the points' distances from their reference, the scene's unit squared.
     reference : {"line", "circle", "nominal"}
+    at : ndarray, shape (m,)
+        Where the points are: shares of an edge's length, or angles around a circle (`Circle.at`), rad.
     """
 
     covariance: np.ndarray
     reference: Reference
+    at: np.ndarray
 
     @classmethod
-    def beside(cls, covariance: np.ndarray, design: np.ndarray, reference: Reference) -> FormLaw:
+    def beside(cls, covariance: np.ndarray, design: np.ndarray, reference: Reference, at: np.ndarray) -> FormLaw:
         """From errors of the points' places, of which a least-squares fit of a design (m, k) takes a part."""
         left = residues(design) if reference != "nominal" else np.eye(len(design))
-        return cls(left @ covariance @ left.T, reference)
+        return cls(left @ covariance @ left.T, reference, at)
 
     @property
     def extreme(self) -> Extreme:
@@ -137,11 +140,12 @@ def _law(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
 
 @dataclass(frozen=True, eq=False)
 class _EdgeErrors:
-    """Along the used part of one edge, of pictures (...): `EdgeNodes.t` (..., n), standard deviations of points there
-    (..., n), the scene's unit, NaN without enough contrast, length of the part (...), ideal px, and recorded px for an
-    ideal one."""
+    """Along the used part of one edge, of pictures (...): `EdgeNodes.t` and ``spatial`` (..., n), standard deviations
+    of points there (..., n), the scene's unit, NaN without enough contrast, length of the part (...), ideal px, and
+    recorded px for an ideal one."""
 
     t: np.ndarray
+    spatial: np.ndarray
     sigma: np.ndarray
     length: np.ndarray
     along: np.ndarray
@@ -161,7 +165,8 @@ def _edge_errors(pictures: Pictures, quantity: Quantity) -> _EdgeErrors:
     clear = squared >= CLEAREST**2 * noise
     lost = (clear.mean(-1) < LEAST_CLEAR) | ~(length >= MIN_USABLE) | ~known.view.visible[..., e]
     sigma = np.where(clear, np.sqrt(variance) * unit, np.nan)
-    return _EdgeErrors(nodes.t[..., e, :], sigma, np.where(lost, np.nan, length), pick[2].mean(-1))
+    own = nodes.t[..., e, :], nodes.spatial[..., e, :]
+    return _EdgeErrors(*own, sigma, np.where(lost, np.nan, length), pick[2].mean(-1))
 
 
 def _of_edge(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
@@ -173,7 +178,8 @@ def _of_edge(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
     at = at[np.interp(at, found.t, 1.0 * clear) >= LEAST_CLEAR]
     sigma = np.interp(at, found.t[clear], found.sigma[clear])
     apart = correlation((at[:, None] - at) * found.along, scale)
-    return FormLaw.beside(sigma[:, None] * sigma * apart, np.stack([np.ones(at.size), at], -1), reference_of(quantity))
+    design, where = np.stack([np.ones(at.size), at], -1), np.interp(at, found.t, found.spatial)
+    return FormLaw.beside(sigma[:, None] * sigma * apart, design, reference_of(quantity), where)
 
 
 def _glanced_edge(pictures: Pictures, quantity: Quantity) -> np.ndarray:
@@ -203,7 +209,8 @@ def _of_rim(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
     design = np.stack([_between(column, used, at[pick]) for column in image.design.T[:3]], -1)
     sigma = _between(sigma, used, at[pick])
     covariance = sigma[:, None] * sigma * correlation(apart, scale)
-    return FormLaw.beside(covariance, design / design[:, 2:3], reference_of(quantity))
+    around = each.angles(count)[pick] if isinstance(each, Circle) else 2 * np.pi * pick / count
+    return FormLaw.beside(covariance, design / design[:, 2:3], reference_of(quantity), around)
 
 
 def _between(values: np.ndarray, used: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -274,4 +281,4 @@ def _unit_variance(count: int, reference: Reference, closed: bool) -> float:
     design = np.stack([np.ones(count), at], -1)
     if reference == "circle":
         design = np.stack([np.cos(turn), np.sin(turn), np.ones(count)], -1)
-    return FormLaw.beside(correlation(SPACING * apart, 1.0), design, reference).noise.u ** 2
+    return FormLaw.beside(correlation(SPACING * apart, 1.0), design, reference, turn).noise.u ** 2

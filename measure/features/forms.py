@@ -52,6 +52,8 @@ class FormTool:
         The scene's unit for an ideal px across the feature.
     design : ndarray, shape (m, k)
         What the reference can be, the scene's unit.
+    at : ndarray, shape (m,)
+        As of `FormLaw`.
     is_closed : bool
         Whether the points go all the way around.
     reference : {"line", "circle", "nominal"}
@@ -65,6 +67,7 @@ class FormTool:
     inward: np.ndarray
     unit: np.ndarray
     design: np.ndarray
+    at: np.ndarray
     is_closed: bool
     reference: Reference
     optics: Optics
@@ -167,7 +170,7 @@ def _measured(image: np.ndarray, tool: FormTool) -> tuple[FoundForm | None, str]
     if valid.mean() < LEAST_CLEAR or valid.sum() <= tool.design.shape[1] + 1:
         return None, status.LOW_CONTRAST
     errors = _errors(used[0], tool, contrast, np.flatnonzero(valid))
-    law = FormLaw.beside(errors, tool.design[valid], tool.reference)
+    law = FormLaw.beside(errors, tool.design[valid], tool.reference, tool.at[valid])
     at = ((offset + tool.inward) * tool.unit)[valid]
     if tool.reference != "nominal":
         at = residues(tool.design[valid]) @ at
@@ -226,7 +229,7 @@ def _edge_tool(picture: Picture, quantity: Quantity, off: tuple[float, float]) -
     unit = 1 / known.seen.per_unit(quantity.features[0], places, normals(known.view)[e])
     design = np.stack([np.ones(share.size), share - share.mean()], -1)
     return FormTool(
-        gradient_locator(layout.optics, caliper), np.arange(share.size), moved, unit, design, False,
+        gradient_locator(layout.optics, caliper), np.arange(share.size), moved, unit, design, share, False,
         reference_of(quantity), layout.optics, caliper.status,
     )  # fmt: skip
 
@@ -248,8 +251,8 @@ def _of_rim(tool: RimTool, errors: np.ndarray, quantity: Quantity) -> FormTool:
     unit = 1 / tool.design[pick, 2]
     inward = (tool.inward - tool.beside(errors[None])[0])[pick]
     return FormTool(
-        tool.locator, pick, inward, unit, tool.design[pick, :3] * unit[:, None], _is_closed(tool),
-        reference_of(quantity), tool.optics, tool.state,
+        tool.locator, pick, inward, unit, tool.design[pick, :3] * unit[:, None],
+        tool.locator.positions[pick], _is_closed(tool), reference_of(quantity), tool.optics, tool.state,
     )  # fmt: skip
 
 

@@ -42,7 +42,7 @@ class FormSize:
 
     Examples
     --------
-    >>> law = FormLaw.beside(0.01**2 * np.eye(60), np.ones((60, 1)), "line")
+    >>> law = FormLaw.beside(0.01**2 * np.eye(60), np.ones((60, 1)), "line", np.arange(60))
     >>> found = FormSize(value=0.004, u=0.007, seen=0.050, law=law)
     >>> low, high = found.interval()
     >>> print(f"from {low:.3f} to {high:.3f}: {found.decide(0.02)} of 0.02, {found.decide(0.1)} of 0.1")
