@@ -195,9 +195,7 @@ def _errors(shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Fo
     return whole
 
 
-def _states(
-    known: Measurands, shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Forms]
-) -> np.ndarray:
+def _states(known: Measurands, shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Forms]) -> np.ndarray:
     """Status of each quantity in each image, (n, M): the worst of what it needs."""
     names = known.view.names
     found = np.empty((len(shape.status), len(known.quantities)), object)

@@ -15,7 +15,7 @@ import numpy as np
 from imaging.features.circles import RimImage, rim
 from imaging.features.limbs import limb_rim
 from imaging.features.measurand import Measurands, measurands
-from imaging.models.extremes import Law, extremes_of, largest_moments, with_extremes
+from imaging.models.extremes import extremes_of, largest_moments, of_largest, with_extremes
 from imaging.models.form_law import form_variances
 from imaging.pictures import Pictures
 from scenes import Circle, Curved, Quantity
@@ -152,15 +152,11 @@ def _variances(errors: Errors, gradient: np.ndarray, values: np.ndarray) -> np.n
     for m, rows, sign in extremes_of(quantities):
         joint = errors.covariance(gradient[..., rows, :])
         if joint.ndim == 2 and np.isfinite(joint).all():
-            told = Law.of(sign * values[rows], joint, _largest).u ** 2
+            told = of_largest(sign * values[rows], joint)[1]
         else:
             told = largest_moments(sign * values[..., rows], joint)[1]
         found[..., m] = np.where(np.isfinite(found[..., m]) & np.isfinite(told), told, np.inf)
     return found
-
-
-def _largest(numbers: np.ndarray) -> np.ndarray:
-    return numbers.max(-1)
 
 
 def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = None) -> np.ndarray:

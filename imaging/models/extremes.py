@@ -96,13 +96,23 @@ def with_extremes(
         part = covariance[np.ix_(rows, rows)]
         if not (np.isfinite(values[rows]).all() and np.isfinite(part).all()):
             continue
-        each = sign * values[rows] + drawn(part)
-        shares = np.bincount(each.argmax(1), minlength=len(rows)) / len(each)
+        shares, variance = of_largest(sign * values[rows], part)
         gradient[m] = shares @ gradient[rows]
         with np.errstate(invalid="ignore"):
             covariance[m] = covariance[:, m] = shares @ covariance[rows]
-        covariance[m, m] = each.max(1).var()
+        covariance[m, m] = variance
     return gradient, covariance
+
+
+def of_largest(mean: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, float]:
+    """Probabilities (n,) that each of n jointly normal numbers is the largest, and the variance of that.
+
+    Draws tell by how much it exceeds the variance of the numbers' mean with those weights.
+    """
+    each = mean + drawn(covariance)
+    shares = np.bincount(each.argmax(1), minlength=len(mean)) / len(each)
+    beside = each.max(1).var() - (each @ shares).var()
+    return shares, float(shares @ covariance @ shares + max(beside, 0.0))
 
 
 def largest_moments(mean: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,8 +1,8 @@
 """The zone that one feature's edge points need, whatever the estimator: what noise adds to it is taken off.
 
 The points are those of the `gradient` locator along the edge, or of the locator around a rim. Their joint errors are
-known from its response to the pixels and the contrast that the image shows. The form is estimated from the parts of the
-points' distances that stand out of them - cosines along an edge, waves around a circle - and tells what noise adds.
+known from its response to the pixels and the contrast that the image shows. The form is estimated from what stands out
+of them - cosines along an edge, waves around a circle, single points - and tells what noise adds.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ _GRID = 0.5  # px to which the place of an edge is rounded where it is looked fo
 _SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
 _GAP = 3.0  # times the usual way between places, that a rim without gaps may have
 _NONE = 1e-6  # part of the largest variance of a wave: less is rounding
-_FALSE = 0.005  # probability that noise alone makes a part of the form of a feature that has none
+_FALSE = 0.001  # probability that noise alone makes a wave, or a point, of the form of a feature that has none
+_LIKELY = 3.0  # standard deviations of further waves of a form that is sure
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +99,18 @@ class FoundForm:
 
     @property
     def form(self) -> np.ndarray:
-        """What stands out of the points' errors: the sum of the waves that are significant together."""
-        waves = _waves(self.points.size, self.is_closed)
+        """What stands out of the points' errors: waves, and then single points; 0 where no wave or point is sure.
+
+        A form that hides in them is not told from noise: the size is then too small by up to two standard deviations.
+        """
+        waves, size = _waves(self.points.size, self.is_closed), self.points.size
         variance = np.einsum("ik,ij,jk->k", waves, self.law.covariance, waves)
         told, known = waves.T @ self.points, variance > _NONE * variance.max()  # others are the reference's own
-        least = special.ndtri(1 - _FALSE / 2 / len(told)) * np.sqrt(np.where(known, variance, np.inf))
-        return waves @ np.where(np.abs(told) > least, told, 0.0)
+        sure = float(special.ndtri(1 - _FALSE / 2 / size))
+        over = np.abs(told) / np.sqrt(np.where(known, variance, np.inf))
+        form = waves @ np.where(over > _LIKELY, told, 0.0) if over.max() > sure else np.zeros(size)
+        left = self.points - form
+        return form + np.where(np.abs(left) > sure * np.sqrt(np.diag(self.law.covariance)), left, 0.0)
 
     def judged(self, *, noiseless: bool) -> tuple[float, float]:
         """Size, what noise adds to it taken off, and its variance, of what was found in an image with or without noise.

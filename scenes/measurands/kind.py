@@ -67,7 +67,8 @@ class MeasurandKind:
     """Whether it is of other measurands' numbers (`scenes.measurands.chain`)."""
 
     extreme: ClassVar[int] = 0
-    """Of a chain +1 where it is the largest of its numbers, -1 where it is the smallest: not normal if several may be."""
+    """Of a chain +1 where it is the largest of its numbers, -1 where it is the smallest: not normal if several may be
+    it."""
 
     def takes(self, features: tuple) -> bool:
         """Whether these features, in their order, make one."""

@@ -103,6 +103,14 @@ class Quantity:
         return self.terms[0].is_angle if self.terms else MEASURANDS[self.kind].is_angle
 
     @property
+    def told_of(self) -> str:
+        """Of what it is, in words: its features, or the numbers of a chain."""
+        if not self.terms:
+            return " to ".join(map(place_of, self.features))
+        signs = ("" if sign > 0 else "less " for sign in self.signs)
+        return ", ".join(f"{sign}{term.name}" for sign, term in zip(signs, self.terms, strict=True))
+
+    @property
     def axis(self) -> int:
         """Of a coordinate: 0 for x, 1 for y."""
         return int(self.name.endswith(".y"))
@@ -130,8 +138,8 @@ class Measurand(Model):
     Geometric tolerances, whose ``tolerance`` is the zone's width or diameter: ``true_position`` of a corner or centre
     in a datum system of two features, an edge and an edge or a point, or a point and a point or an edge, as NAME.x and
     NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, as NAME.x and NAME.y; ``symmetry`` of a line
-    or a point about a line; ``parallelism`` and ``perpendicularity`` of an edge to a datum edge; forms, of all points of
-    a feature: ``straightness`` of an edge, ``roundness`` of a circle, an arc or a ball.
+    or a point about a line; ``parallelism`` and ``perpendicularity`` of an edge to a datum edge; forms, of all points
+    of a feature: ``straightness`` of an edge, ``roundness`` of a circle, an arc or a ball.
 
     Chains, of the numbers of measurands before it that ``of`` names: ``mean``, ``sum`` (less those that ``minus``
     names), ``largest``, ``smallest``.

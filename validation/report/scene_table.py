@@ -11,8 +11,7 @@ from rich.console import Group
 from rich.text import Text
 
 from scenes import Curved, Mesh, Scene
-from scenes.measurands.features import place_of
-from scenes.measurands.measurands import Quantity, quantities_of
+from scenes.measurands.measurands import quantities_of
 from scenes.parts.recognised import Recognised, cylinders
 from scenes.parts.solid import Circle, Edge, Solid
 from scenes.results import picked
@@ -131,17 +130,9 @@ def _requirements(scene: Scene) -> Iterator[tuple[str, ...]]:
         yield (
             each.name,
             each.kind,
-            named(each),
+            each.told_of,
             f"{zone(each.tolerance)} {unit}".replace("±", "+-"),
         )
-
-
-def named(quantity: Quantity) -> str:
-    """Of what a number is: its features, or the numbers of a chain."""
-    if not quantity.terms:
-        return " to ".join(map(place_of, quantity.features))
-    signs = ("" if sign > 0 else "less " for sign in quantity.signs)
-    return ", ".join(f"{sign}{term.name}" for sign, term in zip(signs, quantity.terms, strict=True))
 
 
 def _place(at: list[float]) -> tuple[str, ...]:
