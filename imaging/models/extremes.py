@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from scenes import Quantity
 from scenes.measurands.kinds import MEASURANDS
@@ -153,7 +153,9 @@ def unit_normals(count: int) -> np.ndarray:
     """Independent standard normal numbers, shape (`DRAWS`, count)."""
     if count == 0:
         return np.zeros((DRAWS, 0))
-    uniform = stats.qmc.Sobol(count, scramble=True, rng=np.random.default_rng(0)).random(DRAWS)
+    from scipy.stats import qmc  # half a second to load, which scenes without extremes do not need
+
+    uniform = qmc.Sobol(count, scramble=True, rng=np.random.default_rng(0)).random(DRAWS)
     return special.ndtri(np.clip(uniform, 1e-16, 1 - 1e-16))
 
 

@@ -251,12 +251,13 @@ def _caliper(layout: Layout, name: str, off: tuple[float, float]) -> tuple[Calip
     return each, off[0] + (off[1] - off[0]) * share
 
 
-def _of_rim(tool: RimTool, errors: np.ndarray, quantity: Quantity) -> FormTool:
-    """Of a circle or the limb of a ball, from what finds it, and its errors (p,) there."""
+def _of_rim(tool: RimTool, moved: np.ndarray, errors: np.ndarray, quantity: Quantity) -> FormTool:
+    """Of a circle or the limb of a ball, from what finds it, the errors (p,) at which that expects it, and those from
+    there."""
     spacing = np.linalg.norm(np.diff(tool.places, axis=0), axis=-1) if len(tool.places) > 1 else np.ones(1)
     pick = np.arange(len(tool.weights))[:: thinned(float(np.median(spacing)), tool.optics.scale_px)]
     unit = 1 / tool.design[pick, 2]
-    inward = (tool.inward - tool.beside(errors[None])[0])[pick]
+    inward = (tool.inward - tool.beside(errors[None])[0] + tool.design @ moved)[pick]
     return FormTool(
         tool.locator, pick, inward, unit, tool.design[pick, :3] * unit[:, None],
         tool.locator.positions[pick], _is_closed(tool), reference_of(quantity), tool.optics, tool.state,

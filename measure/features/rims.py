@@ -101,19 +101,20 @@ def tells_errors(response: sparse.csr_array, clean: np.ndarray, picture: Picture
     return is_linear(*map(np.concatenate, (linear, full, found)))
 
 
-def nearest_tools(picture: Picture, name: str, found: Circles) -> list[tuple[RimTool, np.ndarray] | None]:
-    """Of each image the tool by which a circle was found in it, and its errors (p,) from where that expects it; None
-    where it was not found."""
-    here, tools = unmoved(picture, name), []
+def nearest_tools(picture: Picture, name: str, found: Circles) -> list[tuple[RimTool, np.ndarray, np.ndarray] | None]:
+    """Of each image the tool by which a circle was found in it, the errors (p,) at which that expects it, and how far
+    it was found from there; None where it was not found."""
+    tools: list[tuple[RimTool, np.ndarray, np.ndarray] | None] = []
     for errors in found.errors:
         if not np.isfinite(errors).all():
             tools.append(None)
             continue
-        tool, moved = rim_tool(picture, name, here), here
+        moved = unmoved(picture, name)
+        tool = rim_tool(picture, name, moved)
         if _is_far(tool, errors[None])[0]:
             moved = _rounded(tool, errors)
             tool = rim_tool(picture, name, moved)
-        tools.append((tool, errors - np.array(moved)))
+        tools.append((tool, np.array(moved), errors - np.array(moved)))
     return tools
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from scenes.measurands.features import Side
 from scenes.measurands.form import Form
 from scenes.measurands.kind import MEASURANDS
 
@@ -18,7 +19,7 @@ class Straightness(Form):
 
     def check(self, solid, key, quantity) -> None:
         """An edge of the part: what lies between others has no points of its own."""
-        if not hasattr(quantity.features[0], "edge"):
+        if not isinstance(quantity.features[0], Side):
             raise ValueError(f"{key} must be an edge for kind straightness, got {', '.join(quantity.edges)}")
 
 

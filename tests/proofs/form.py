@@ -59,6 +59,11 @@ class Case:
     def quantity(self) -> Quantity:
         return self.picture.scene.quantities[0]
 
+    @property
+    def is_edge(self) -> bool:
+        """Whether it is a straight edge; else a circle."""
+        return self.quantity.edges[0] not in (circle.name for circle in self.picture.scene.solid.rims)
+
     @cached_property
     def passed(self) -> float:
         """Part of a wave's height that the locator's Gaussian leaves as it smooths along the feature."""
@@ -116,14 +121,22 @@ class Row:
 
 
 def cases(folder: Path, amplitude: float = 4.0) -> list[Case]:
-    """An edge, a bore and a ball, each without form error and with one."""
+    """An edge and a bore, each without form error and with one."""
     block = scenes.load("task1").with_(task=None, settings=[], measurands=[
         {"name": "front", "kind": "straightness", "features": [{"edge": "e7"}], "tolerance": 0.05}])  # fmt: skip
     plate = toleranced.scene(folder, ("back",), 720, width=480, height=384, focal_px=1800.0).with_(measurands=[
         {"name": "bore", "kind": "roundness", "features": [{"circle": "c4"}], "tolerance": 0.1}])  # fmt: skip
+    edge, bore = (
+        scene.with_(
+            measurands=[{**scene.measurands[0].model_dump(mode="json", exclude_defaults=True), "kind": "profile"}]
+        )
+        for scene in (block, plate)
+    )
     of = {
         "straightness": (Picture.of(block, (30, 135), (15, 315)), 1.7),
         "roundness": (Picture.of(plate, (10, 300), (5, 40)), 3.0),
+        "profile of an edge": (Picture.of(edge, (30, 135), (15, 315)), 1.7),
+        "profile of a bore": (Picture.of(bore, (10, 300), (5, 40)), 2.0),
     }
     return [
         Case(f"{name}, {f'{waves:g} waves' if high else 'no form'}", picture, high, waves)
@@ -177,13 +190,14 @@ def _deviation(seen: np.ndarray, laws: Sequence[Law]) -> float:
 
 def _form(case: Case, at: np.ndarray, high: float, phase: float) -> np.ndarray:
     """Distances at places, less the reference by least squares."""
-    is_line = case.quantity.kind == "straightness"
-    design = [np.ones(at.size), at] if is_line else [np.ones(at.size), np.cos(at), np.sin(at)]
+    if case.quantity.kind == "profile":
+        return _wave(case, at, high, phase)
+    design = [np.ones(at.size), at] if case.is_edge else [np.ones(at.size), np.cos(at), np.sin(at)]
     return residues(np.stack(design, -1)) @ _wave(case, at, high, phase)
 
 
 def _wave(case: Case, at: np.ndarray, high: float, phase: float) -> np.ndarray:
-    turn = at * (2 * np.pi if case.quantity.kind == "straightness" else 1.0)
+    turn = at * (2 * np.pi if case.is_edge else 1.0)
     return high * np.sin(case.waves * turn + phase)
 
 
@@ -191,7 +205,9 @@ def _zone(case: Case, law: FormLaw, high: float, phase: float) -> float:
     """What the true form needs over the part that is measured: from many places, by a fit of its own."""
     dense = np.linspace(law.at.min(), law.at.max(), _PLACES)
     wave = _wave(case, dense, high, phase)
-    if case.quantity.kind == "straightness":
+    if case.quantity.kind == "profile":
+        return 2 * float(np.abs(wave).max())
+    if case.is_edge:
         return float(np.ptp(wave - np.polyval(np.polyfit(dense, wave, 1), dense)))
     waves = np.stack([np.ones(dense.size), np.cos(dense), np.sin(dense)], -1)
     return float(np.ptp(wave - waves @ np.linalg.lstsq(waves, wave, rcond=None)[0]))
@@ -228,7 +244,7 @@ def _tree(places: np.ndarray):
 def _outline(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (n, 2) of the feature's image, the shift there for a unit across it (n, 2), px, and where that is (n,)."""
     scene, pose = case.picture.scene, np.array(list(case.picture.sensor))
-    if case.quantity.kind == "straightness":
+    if case.is_edge:
         at = np.linspace(0, 1, _PLACES)
         edge = scene.solid.edge(case.quantity.edges[0])
         start, stop = scene.solid.vertices[list(edge.ends)]
@@ -251,7 +267,7 @@ def form(
     amplitude: Annotated[float, typer.Option(help="Of forms, of the standard deviation of a point.")] = 4.0,
     seed: Annotated[int, typer.Option()] = 1,
 ) -> None:
-    """Zones of forms: mean, 95 % quantile and decisions of simulated parts; three minutes of processor time."""
+    """Zones of forms: mean, 95 % quantile and decisions of simulated parts; six minutes of processor time."""
     rng = np.random.default_rng(seed)
     with tempfile.TemporaryDirectory() as folder:
         rows = []
