@@ -120,16 +120,18 @@ def form_variances(pictures: Pictures, known: Measurands, rims: list[RimImage]) 
     rims : list of RimImage
         Of the circles of ``known``.
     """
-    found = []
-    for quantity in known.seen.forms:
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if pictures.closely:
-            law = form_law(pictures, quantity)
-            found.append(np.array(np.inf if law is None else law.noise.u**2))
-        elif reference_of(quantity) == "circle" or place_of(quantity.features[0]) in known.circles:
-            found.append(_glanced_rim(pictures, quantity, rims[known.circles.index(place_of(quantity.features[0]))]))
-        else:
-            found.append(_glanced_edge(pictures, quantity))
-    return tuple(found)
+            laws = (form_law(pictures, quantity) for quantity in known.seen.forms)
+            return tuple(np.array(np.inf if law is None else law.noise.u**2) for law in laws)
+        return tuple(_glanced(pictures, quantity, known, rims) for quantity in known.seen.forms)
+
+
+def _glanced(pictures: Pictures, quantity: Quantity, known: Measurands, rims: list[RimImage]) -> np.ndarray:
+    name = place_of(quantity.features[0])
+    if name in known.circles:
+        return _glanced_rim(pictures, quantity, rims[known.circles.index(name)])
+    return _glanced_edge(pictures, quantity)
 
 
 def _law(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
@@ -245,11 +247,9 @@ def _is_lost(image: RimImage) -> np.ndarray:
 
 
 def _glanced_rim(pictures: Pictures, quantity: Quantity, image: RimImage) -> np.ndarray:
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        used, sigma = _rim_errors(pictures, image)
-        length = np.where(used, image.arc, 0.0).sum(-1)
-        count = length / (SPACING * pictures.scene.locator.scale_px)
-        found = _worst(sigma, used) * _tabulated(count, reference_of(quantity), image.turn == 1)
+    used, sigma = _rim_errors(pictures, image)
+    count = np.where(used, image.arc, 0.0).sum(-1) / (SPACING * pictures.scene.locator.scale_px)
+    found = _worst(sigma, used) * _tabulated(count, reference_of(quantity), image.turn == 1)
     return np.where(_is_lost(image) | ~np.isfinite(found), np.inf, found)
 
 
