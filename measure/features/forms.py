@@ -34,7 +34,7 @@ _GRID = 0.5  # px to which the place of an edge is rounded where it is looked fo
 _SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
 _GAP = 3.0  # times the usual way between places, that a rim without gaps may have
 _NONE = 1e-6  # part of the largest variance of a wave: less is rounding
-_FALSE = 0.001  # probability that noise alone makes a wave, or a point, of the form of a feature that has none
+_FALSE = 1e-4  # probability that noise alone makes a wave, or a point, of the form of a feature that has none
 _LIKELY = 3.0  # standard deviations of further waves of a form that is sure
 
 

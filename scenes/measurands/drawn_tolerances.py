@@ -21,8 +21,6 @@ _MOST = 8  # measurands that are offered for one feature
 _OFF = 1e-3  # degrees: of an angle that the model has
 _SURFACE = {"flatness", "cylindricity", "profile of a surface", "circular runout", "total runout"}
 _INSIDE = "it needs the form of a whole surface, which edges in a picture do not show"
-_NOT_YET = "not yet among the kinds of measurand"
-_LINE = "profile of a line"
 _OF_THE_SCENE = "its zone is about a place in its datums, and kind profile is about the scene's own"
 _NO_ZONE = "the file gives no size of the zone"
 _NO_FACES = "the file says of no face what it is of"
@@ -71,7 +69,7 @@ def toleranced(known: Faces, each: Characteristic, datums: dict[str, tuple[int, 
         The part's.
     """
     if each.kind not in _KINDS:
-        return _INSIDE if each.kind in _SURFACE else _OF_THE_SCENE if each.kind == _LINE else _NOT_YET
+        return _INSIDE if each.kind in _SURFACE else _OF_THE_SCENE  # profile of a line
     if not each.zone:
         return _NO_ZONE
     lost = [letter for letter in _letters(each) if not known.of(datums.get(letter, ()))]
