@@ -134,6 +134,11 @@ def test_through_all_commands(tmp_path):
         sum(each.text == "PASS" for each in results.iter("{http://qifstandards.org/xsd/qif3}CharacteristicStatusEnum"))
         == 8
     )
+    told = json.loads(ice("predict", "plate.toml", *POSES, "--json", cwd=tmp_path).stdout)["settings"][0]["measurands"]
+    by_noise = {each["name"]: each["noise_zone"] for each in told if "noise_zone" in each}
+    assert set(by_noise) == set(zones)
+    assert all(zones[name]["value"] + 4 * zones[name]["u"] < each["at_most"] * 2 for name, each in by_noise.items())
+    assert "points of a perfect feature seem to need" in ice("predict", "plate.toml", *POSES, cwd=tmp_path).stdout
     shown = " ".join(ice("show", "plate.toml", cwd=tmp_path).stdout.split())
     assert "difference sum B, less C" in shown
     told = json.loads(ice("budget", "plate.toml", *POSES, "--json", cwd=tmp_path).stdout)
