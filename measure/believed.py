@@ -47,6 +47,7 @@ def believed(picture: Picture, errors: np.ndarray) -> np.ndarray:
     points = known.seen.start + offset * normal + image_centre(known.seen.camera)
     turned = unit_normals(along + turn * np.linalg.norm(along, axis=-1, keepdims=True) * normal)
     circles = tuple(errors[:, known.seen.numbers(c)] for c in range(len(known.circles)))
-    seen = found_in_images(known, layout_of(picture), turned, points, circles)
+    forms = dict(zip(known.seen.forms, errors[:, known.seen.of_forms].T, strict=True))
+    seen = found_in_images(known, layout_of(picture), turned, points, circles, forms)
     none = np.zeros((len(errors), errors.shape[1], errors.shape[1]))
     return values(seen, known.quantities, on_plane, none).value

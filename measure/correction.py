@@ -210,7 +210,7 @@ def _measured(
     levels: np.ndarray, picture: Picture, estimator: str, threshold: float | None
 ) -> tuple[np.ndarray, np.ndarray, MeasuredFeatures]:
     """Values (n, M) in n noise-free images, in the object and in the image, NaN where there is none, and features."""
-    found = find(levels, picture, estimator, threshold)
+    found = find(levels, picture, estimator, threshold, noiseless=True)
     measured = np.isin(found.status, MEASURED)
     return np.where(measured, found.plane.value, np.nan), np.where(measured, found.image.value, np.nan), found
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from measure.correction import Correction
 from measure.estimators.registry import best_estimator
+from measure.features.forms import FoundForm
 from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import MeasuredFeatures, find
 from measure.saturation import saturated
@@ -51,6 +52,9 @@ class Measurements(Shown):
         where none was made; infinite where more pixels are saturated, or fewer, than those of which it tells. Where
         one was, the variances of what was ``clutter`` or ``misfit`` are those propagated in the simulated picture, for
         the estimator's own are those of a lone edge.
+    forms : dict
+        By name of each form (`scenes.measurands.form`) its points and their law in each image, in order
+        (`measure.features.forms.FoundForm`); None where it is not found.
     """
 
     quantities: tuple[Quantity, ...]
@@ -67,6 +71,7 @@ class Measurements(Shown):
     saturated: np.ndarray
     bias: np.ndarray
     u_bias: np.ndarray
+    forms: dict[str, tuple[FoundForm | None, ...]] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -241,6 +246,7 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         saturated=saturation.reshape(lead),
         bias=np.zeros(count),
         u_bias=np.full((*lead, count), np.nan),
+        forms={quantity.name: form.found for quantity, form in found.forms.items()},
     )
 
 

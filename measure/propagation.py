@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from imaging.models.bias import MOST
+from imaging.models.extremes import with_extremes
 from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.kinds import ESTIMATORS
@@ -125,20 +126,24 @@ def propagate(
     camera = picture.scene.camera
     clean, noise = recorded(picture.scene.noise, checked_image(one_picture(clean), (camera.height, camera.width)))
     noise = np.broadcast_to(noise, clean.shape).ravel()
-    found = find(clean[None], picture, estimator, threshold)
+    found = find(clean[None], picture, estimator, threshold, noiseless=True)
     rows, lost = _responses(clean, picture, found, estimator, threshold)
     state = [str(each) for each in found.status[0]]
     for m, gone in enumerate(((found.image.gradient[0] != 0) & lost).any(-1)):
         if gone and state[m] in status.MEASURED:  # noise decides which of two edges is found, or a wrong one was
             state[m] = status.ILL_CONDITIONED
     errors = (rows.multiply(noise).tocsr() @ rows.T).toarray()
+    errors[np.diag_indices(len(errors))] += _of_forms(found)
     gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
-    image, plane = (_covariance(gradient, errors, state) for gradient in gradients)
+    image, plane = (
+        with_extremes(found.known.quantities, part.value[0], gradient, _covariance(gradient, errors, state))[1]
+        for gradient, part in zip(gradients, (found.image, found.plane), strict=True)
+    )
     responses = [sparse.csr_array(gradient) @ rows for gradient in gradients]
     uneven = Unevenness.about(picture, responses[1]) if picture.lights and picture.scene.textures else None
     shifts = np.zeros(len(state))
     if uneven is not None and uneven.change.any():
-        even = find((clean - uneven.change)[None], picture, estimator, threshold)
+        even = find((clean - uneven.change)[None], picture, estimator, threshold, noiseless=True)
         shifts = np.nan_to_num(found.image.value[0] - even.image.value[0])
     values = _values(found, image, plane, state, not photographed, shifts)
     if uneven is not None:
@@ -160,10 +165,18 @@ def _responses(
         if told is None or not tells_errors(told, clean, picture, name):
             told = _none(circle.errors.shape[1], clean.size)
         parts.append(told)
+    parts.append(sparse.csr_array((len(found.forms), clean.size)))  # an extreme has none: its variance is its law's
     rows = sparse.vstack(parts, format="csr")  # few of the pixels of a large image
     lost = np.array([not np.isfinite(rows.data[start:stop]).all() for start, stop in pairwise(rows.indptr)], bool)
     rows.data[np.repeat(lost, np.diff(rows.indptr))] = 0.0
     return rows, lost
+
+
+def _of_forms(found: MeasuredFeatures) -> np.ndarray:
+    """Variances (q,) of the sizes of forms in one image, by their laws; 0 of lines and circles."""
+    own = np.zeros(found.seen.count)
+    own[found.seen.of_forms] = [np.nan_to_num(form.variance[0]) for form in found.forms.values()]
+    return own
 
 
 def _none(rows: int, pixels: int) -> sparse.csr_array:

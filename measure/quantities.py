@@ -11,8 +11,10 @@ from imaging.features.kinds import Evaluated, in_image, on_plane
 from imaging.features.measurand import Measurands, dense, measurands
 from imaging.features.seen import Seen
 from imaging.geometry.lens import image_centre
+from imaging.models.extremes import extremes_of, with_extremes
 from imaging.pictures import Pictures
 from measure.features.corners import intersect
+from measure.features.forms import Forms, find_form
 from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import Circles, find_circle
@@ -41,6 +43,8 @@ class MeasuredFeatures:
     shape : Shape
         The lines.
     circles : tuple of Circles
+    forms : dict
+        What is found of each `Quantity` that is a form.
     seen : Seen
     errors : ndarray, shape (n, q, q)
         Joint covariance of lines and circles; those of different circles, and of circles and lines, count as
@@ -51,6 +55,7 @@ class MeasuredFeatures:
     known: Measurands
     shape: Shape
     circles: tuple[Circles, ...]
+    forms: dict[Quantity, Forms]
     seen: Seen
     errors: np.ndarray
     status: np.ndarray
@@ -85,31 +90,43 @@ class MeasuredFeatures:
         return corners, _spread(rows, self.errors)
 
 
-def find(images: np.ndarray, picture: Picture, estimator: str, threshold: float | None = None) -> MeasuredFeatures:
+def find(
+    images: np.ndarray, picture: Picture, estimator: str, threshold: float | None = None, *, noiseless: bool = False
+) -> MeasuredFeatures:
     """All quantities in images, shape (n, height, width).
 
-    Straight edges by the estimator; circles by edge points around their rims, whatever the estimator.
+    Straight edges by the estimator; circles by edge points around their rims, and forms by points, whatever the
+    estimator. Of ``noiseless`` images a form's size is what noisy ones give on average.
     """
     known, layout = measurands(Pictures.of(picture)), layout_of(picture)
     first = picture.scene.locator.thresholds[0]
     shape = find_shape(images, layout, estimator, first if threshold is None else threshold)
     circles = tuple(find_circle(images, picture, name) for name in known.circles)
-    seen = found_in_images(known, layout, shape.normals, shape.points, tuple(c.errors for c in circles))
-    errors = _errors(shape, circles, known.seen)
+    by_name = dict(zip(known.circles, circles, strict=True))
+    forms = {
+        quantity: find_form(images, picture, quantity, shape, by_name, noiseless=noiseless)
+        for quantity in known.seen.forms
+    }
+    sizes = {quantity: form.size for quantity, form in forms.items()}
+    seen = found_in_images(known, layout, shape.normals, shape.points, tuple(c.errors for c in circles), sizes)
+    errors = _errors(shape, circles, forms, known.seen)
     return MeasuredFeatures(
         known=known,
         shape=shape,
         circles=circles,
+        forms=forms,
         seen=seen,
         errors=errors,
-        status=_states(known, layout, shape, circles),
+        status=_states(known, shape, circles, forms),
     )
 
 
 def found_in_images(
-    known: Measurands, layout: Layout, normals: np.ndarray, points: np.ndarray, circle_errors: tuple[np.ndarray, ...]
-) -> Seen:
-    """What is seen in n images: lines of unit normals and points (n, E, 2), and errors (n, p) of each circle."""
+    known: Measurands, layout: Layout, normals: np.ndarray, points: np.ndarray, circle_errors: tuple[np.ndarray, ...],
+    forms: dict[Quantity, np.ndarray],
+) -> Seen:  # fmt: skip
+    """What is seen in n images: lines of unit normals and points (n, E, 2), errors (n, p) of each circle, and sizes
+    (n,) of forms."""
     expected, count = known.seen, len(normals)
     names = known.view.names
     corners = {}
@@ -137,6 +154,7 @@ def found_in_images(
         radii=radii,
         half_angles=angles,
         expected=False,
+        forms=forms,
     )
 
 
@@ -147,7 +165,11 @@ def values(seen: Seen, quantities: tuple[Quantity, ...], kind, errors: np.ndarra
         found: list[Evaluated] = [kind(seen, quantity) for quantity in quantities]
         gradient = dense(found, (count,), seen.count)
         value = np.stack([np.broadcast_to(each.value, count) for each in found], -1)
-        return Values(value, gradient, _spread(gradient, errors))
+        covariance = _spread(gradient, errors)
+        if any(True for _ in extremes_of(quantities)):
+            each = [with_extremes(quantities, *one) for one in zip(value, gradient, covariance, strict=True)]
+            gradient, covariance = (np.array(part) for part in zip(*each, strict=True))
+        return Values(value, gradient, covariance)
 
 
 def _spread(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
@@ -161,17 +183,19 @@ def _spread(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
     return np.where(missing[:, :, None] | missing[:, None, :], np.nan, spread)
 
 
-def _errors(shape: Shape, circles: tuple[Circles, ...], seen: Seen) -> np.ndarray:
+def _errors(shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Forms], seen: Seen) -> np.ndarray:
     count, edges = len(shape.lines), shape.lines.shape[-1]
     whole = np.zeros((count, seen.count, seen.count))
     whole[:, :edges, :edges] = shape.lines
     for c, circle in enumerate(circles):
         part = seen.numbers(c)
         whole[:, part, part] = circle.covariance
+    for k, form in enumerate(forms.values(), seen.of_forms.start):
+        whole[:, k, k] = form.variance
     return whole
 
 
-def _states(known: Measurands, layout: Layout, shape: Shape, circles: tuple[Circles, ...]) -> np.ndarray:
+def _states(known: Measurands, shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Forms]) -> np.ndarray:
     """Status of each quantity in each image, (n, M): the worst of what it needs."""
     names = known.view.names
     found = np.empty((len(shape.status), len(known.quantities)), object)
@@ -179,6 +203,7 @@ def _states(known: Measurands, layout: Layout, shape: Shape, circles: tuple[Circ
         columns = [shape.counted[:, names.index(name)] for name in quantity.edges if name in names]
         columns += [circles[known.circles.index(name)].state for name in quantity.edges if name in known.circles]
         columns += [_crossing(shape, names, each) for each in quantity.crossings]
+        columns += [forms[each].state for each in (quantity, *quantity.terms) if each in forms]
         if any(name in names for name in quantity.edges):
             columns.append(shape.whole)
         found[:, m] = [status.worst(*row) for row in zip(*columns, strict=True)]

@@ -13,6 +13,7 @@ from imaging.geometry.projection import jacobian_ideal
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
 from imaging.models.bias import bias, cluttered
 from imaging.models.errors import Errors
+from imaging.models.form_law import FormLaw, form_law
 from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from planner.forecast import Forecast, forecasts, worst
@@ -20,6 +21,7 @@ from planner.ranks import edge_ranks
 from planner.search.objective import DEFAULT_OBJECTIVE, Objective, minimised
 from scenes import Centre, Corner, InvalidInput, Picture, Scene, Unit, Wall
 from scenes.measurands.features import place_of
+from scenes.measurands.form import forms_of
 from scenes.results import Shown
 from scenes.status import GLANCED, OK, WORST_FIRST
 from scenes.units import in_unit
@@ -148,6 +150,14 @@ class Prediction(Shown):
         """That ratio."""
         return max((each.ratio for each in self.measurands if each.ratio is not None), default=None)
 
+    @property
+    def forms(self) -> dict[str, FormLaw]:
+        """Of each form that can be measured, by name, the law of its points' errors, and of the zone that they make of
+        a perfect feature, the scene's unit (`FormLaw.noise`)."""
+        pictures, quantities = Pictures.of(self.picture), forms_of(self.picture.scene.quantities)
+        laws = {quantity.name: form_law(pictures, quantity) for quantity in quantities}
+        return {name: law for name, law in laws.items() if law is not None}
+
     def as_rows(self) -> list[dict[str, Any]]:
         """One record a quantity: scene and poses (`Picture.row`), and what is told of it (`Forecast.as_row`)."""
         return [self.picture.row | each.as_row() for each in self.measurands]
@@ -248,8 +258,7 @@ def predict(
     edges = _edges(evaluated, clutter, off)
     if glance:
         told, edges = (tuple(map(_glanced_at, each)) for each in (told, edges))
-    gradients = evaluated.measurands.gradient, evaluated.measurands.gradient_object
-    covariance, covariance_object = (evaluated.covariance(gradient) for gradient in gradients)
+    covariance, covariance_object = (evaluated.jointly(in_object=each) for each in (False, True))
     first = ("kind", "value_image", "value_object", "variance_image", "variance_object", "bias_image")
     return Prediction(
         model=model,

@@ -26,7 +26,7 @@ from scenes.materials.kinds import MATERIALS, AnyMaterial
 from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.materials.surfaces import Surfaces, surfaces
 from scenes.materials.textures import Texture, check_textures
-from scenes.measurands.features import Basic, Corner, Wall, check_feature, place_of
+from scenes.measurands.features import Basic, Corner, Wall, check_feature
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.material import material_of
 from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
@@ -163,7 +163,7 @@ class Scene(Model):
 
     def _repr_html_(self) -> str:
         rows = [
-            {"measurand": each.name, "kind": each.kind, "of": " to ".join(map(place_of, each.features)),
+            {"measurand": each.name, "kind": each.kind, "of": each.told_of,
              "unit": self.unit_of(each), "plus": each.tolerance and each.tolerance.plus,
              "minus": each.tolerance and each.tolerance.minus}
             for each in quantities_of(self.task, self.measurands)

@@ -9,11 +9,12 @@ import numpy as np
 
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.conformity import Decision, decide
+from planner.uncertainty.extremes import ExtremeValue
 from scenes.measurands.zone import joint_parts
 from scenes.results import finite
 from scenes.status import is_trusted
 from validation.report.requirements import Requirement, measurable_budget, requirements
-from validation.zones import MeasuredZone, measured_zones
+from validation.zones import MeasuredZone, measured_extremes, measured_zones
 
 if TYPE_CHECKING:
     import measure
@@ -126,7 +127,17 @@ def _taken(found: measure.Measurements, number: int) -> Taken:
     joint = joint_parts(found.picture.scene.zones)
     rows = (_inspected(each, float(value), known, number) for each, value in zip(told, found.value, strict=True))
     alone = (replace(row, decision=None) if row.requirement.name in joint else row for row in rows)
-    return Taken(found, tuple(alone), known, measured_zones(found, known))
+    extremes = measured_extremes(found, known)
+    decided = (_by_law(row, extremes[row.requirement.name]) if row.requirement.name in extremes else row
+               for row in alone)  # fmt: skip
+    return Taken(found, tuple(decided), known, measured_zones(found, known))
+
+
+def _by_law(row: Inspected, extreme: ExtremeValue) -> Inspected:
+    """Decided by the joint law of the numbers of which it is the largest or the smallest."""
+    told = row.requirement
+    zone = told.tolerance
+    return row if zone is None else replace(row, decision=extreme.decide(told.nominal, zone, status=told.status))
 
 
 def expanded(found: measure.Measurements) -> SceneBudget | None:

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from uncertainties import covariance_matrix
 
+from imaging.models.extremes import extremes_of
 from planner.budgeting.budgets import SceneBudget
 from planner.uncertainty.conformity import Decision
+from planner.uncertainty.extremes import ExtremeValue
+from planner.uncertainty.forms import FormSize
 from planner.uncertainty.material import MaterialSize
 from planner.uncertainty.zones import ZoneSize
 from scenes import status
@@ -21,19 +24,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredZone:
-    """A zone of several numbers, which decide together.
+    """A zone of several numbers, which decide together, or of all points of a feature.
 
     Attributes
     ----------
     zone : Zone
-    size : ZoneSize
+    size : ZoneSize or FormSize
         What is known of the size that the part needs, the scene's unit; NaN within where something is not measured.
     unit, status : str
         The worst status of its numbers.
     """
 
     zone: Zone
-    size: ZoneSize
+    size: ZoneSize | FormSize
     unit: str
     status: str
 
@@ -77,7 +80,7 @@ class MeasuredZone:
 
 
 def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tuple[MeasuredZone, ...]:
-    """Those of one picture's geometric tolerances that are about several numbers; one number is decided by itself.
+    """Those of one picture's geometric tolerances that no single normal number decides.
 
     ``known`` is the budget of what was measured; without it, or where it leaves out a number, nothing is known.
     """
@@ -85,8 +88,7 @@ def measured_zones(found: measure.Measurements, known: SceneBudget | None) -> tu
     for zone in found.picture.scene.zones:
         if zone.is_joint:
             rows = [names.index(name) for name in zone.numbers]
-            covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.numbers)
-            size = _size(zone, (found.value - found.nominal)[rows], found.value[rows[-1]], covariance)
+            size = _form(found, known, rows[0]) if zone.is_form else _joint(found, known, zone, rows)
             state = status.worst(*(str(found.status[k]) for k in rows))
             made.append(MeasuredZone(zone, size, found.units[rows[0]], state))
     return tuple(made)
@@ -99,6 +101,32 @@ def _size(zone: Zone, off: np.ndarray, last: float, covariance: np.ndarray) -> Z
     signs = np.append(np.ones(len(zone.parts)), zone.material.sign)
     departure = zone.material.departure(float(last))
     return MaterialSize(off[:-1], covariance * np.outer(signs, signs), zone.factor, departure)
+
+
+def measured_extremes(found: measure.Measurements, known: SceneBudget | None) -> dict[str, ExtremeValue]:
+    """Of one picture's numbers those that are the largest or the smallest of others, by name."""
+    told = {}
+    for m, rows, sign in extremes_of(found.quantities):
+        names = tuple(found.names[k] for k in rows)
+        covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, names)
+        told[found.names[m]] = ExtremeValue(found.value[rows], covariance, sign)
+    return told
+
+
+def _joint(found: measure.Measurements, known: SceneBudget | None, zone: Zone, rows: list[int]) -> ZoneSize:
+    covariance = _covariance(found.covariance[np.ix_(rows, rows)], known, zone.numbers)
+    return _size(zone, (found.value - found.nominal)[rows], found.value[rows[-1]], covariance)
+
+
+def _form(found: measure.Measurements, known: SceneBudget | None, row: int) -> FormSize:
+    """Of the row-th number; the form's points, and what else is not exactly known."""
+    name, value = found.names[row], float(found.value[row])
+    (points,) = found.forms[name]
+    if points is None or known is None or name not in {each.name for each in known}:
+        return FormSize(value, np.nan, np.nan, None)
+    u = known[name].u
+    beside = float(np.sqrt(max(u**2 - float(found.covariance[row, row]), 0.0)))
+    return FormSize(max(value, 0.0), u, points.size - float(found.bias[row]), points.law, beside)
 
 
 def _covariance(noise: np.ndarray, known: SceneBudget | None, names: tuple[str, ...]) -> np.ndarray:

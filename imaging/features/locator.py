@@ -14,6 +14,7 @@ CLEARANCE = 3.5  # standard deviations of the smoothed edge that a neighbouring 
 
 MIN_CONTRAST = 5.0  # contrast / noise below which a locator's error is no longer linear in the noise
 MIN_USABLE = 2.0  # px of an edge that must be left after trimming
+_FEWEST = 9  # points on an edge, however short: fewer do not stand for the integral along it
 
 
 def edge_blur(blur_px):
@@ -52,6 +53,14 @@ def correlation(distance: np.ndarray, scale: float) -> np.ndarray:
 def reach(scale: float, blur_px: float) -> float:
     """How near to another edge a locator's result is still undisturbed, px."""
     return float(CLEARANCE * np.hypot(scale, edge_blur(blur_px)))
+
+
+def points_along(length: float, scale: float) -> int:
+    """Number of edge points on a straight edge, px: at most 2 scales apart, and not too few.
+
+    Points in between add nothing, for their errors are smooth.
+    """
+    return max(_FEWEST, int(np.ceil(length / (2 * scale))) + 1)
 
 
 def information_bound(contrast: np.ndarray, noise_variance, blur_px) -> np.ndarray:

@@ -21,6 +21,7 @@ from imaging.geometry.projection import from_axis
 from imaging.pictures import Pictures
 from scenes import Centre, Corner, Quantity, Scene, Task
 from scenes.measurands.features import is_line
+from scenes.measurands.form import forms_of
 
 __all__ = ["Measurand", "Measurands", "corner_response", "measurand", "measurands", "normals", "required_edges"]
 
@@ -174,6 +175,7 @@ def expected(pictures: Pictures, view: ProjectedEdges) -> Seen:
         radii=np.broadcast_to(np.array([rim.radius for rim in rims]), (*lead, len(rims))),
         half_angles=np.broadcast_to(np.array([half_angle_of(rim) for rim in rims]), (*lead, len(rims))),
         expected=True,
+        forms={quantity: np.zeros(lead) for quantity in forms_of(scene.quantities)},
     )
 
 

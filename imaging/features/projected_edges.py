@@ -19,6 +19,8 @@ from imaging.geometry.visibility import boundaries, longest_span, turned
 from imaging.pictures import Pictures
 from scenes import Centre, Corner, Edge, Scene, Solid, Wall
 from scenes.measurands.features import place_of
+from scenes.measurands.form import forms_of
+from scenes.measurands.kinds import MEASURANDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,12 @@ def straight(scene: Scene) -> tuple[str, ...]:
 def circles(scene: Scene) -> tuple[str, ...]:
     """The different circles and curved surfaces that they need."""
     return tuple(dict.fromkeys(place_of(feature) for feature in scene.features if isinstance(feature, Centre | Wall)))
+
+
+def lines_alone(scene: Scene) -> bool:
+    """Whether straight edges' lines tell all quantities, to first order."""
+    extreme = any(MEASURANDS[each.kind].extreme for each in scene.quantities)
+    return not circles(scene) and not forms_of(scene.quantities) and not extreme
 
 
 def corner_features(scene: Scene) -> tuple[Corner, ...]:

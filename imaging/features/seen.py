@@ -3,22 +3,24 @@
 The state of a picture is small errors of what was found: of each edge's line the displacement d along its normal (px)
 at the edge's first end and the rotation theta (rad); of each circle two shifts of its centre in its plane and the
 change of its radius (the scene's unit); of each curved surface, which counts as a circle, the three of
-`Curved.parameters`, of a cone four. They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then the circles
-(`Seen.numbers`). Image coordinates are ideal px from the image's middle, in which lines are straight.
+`Curved.parameters`, of a cone four; of each form (`scenes.measurands.form`) its size, which is found from points that
+no line or circle stands for (the scene's unit). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then
+the circles (`Seen.numbers`), then the forms. Image coordinates are ideal px from the image's middle, in which lines are
+straight.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from imaging.geometry.projection import Frame, camera_frame, rays, sensor_position
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
-from scenes.measurands.evaluated import Line, Moves, Point, mean, shared
-from scenes.measurands.features import Between, ends_of, place_of, point_of
+from scenes.measurands.evaluated import Evaluated, Line, Moves, Point, mean, shared
+from scenes.measurands.features import Between, along_of, ends_of, face_beside, place_of, point_of
 from scenes.measurands.kind import turn
 from scenes.measurands.measurands import Quantity
 
@@ -47,6 +49,8 @@ class Seen:
         The latter, rad, of cones; else 0.
     expected : bool
         Whether this is the object itself, whose points need not be sought along the rays.
+    forms : dict
+        Size (...) of the zone of each `Quantity` that is a form, the scene's unit: 0 of the object itself.
     """
 
     solid: Solid
@@ -61,11 +65,17 @@ class Seen:
     radii: np.ndarray
     half_angles: np.ndarray
     expected: bool
+    forms: Mapping[Quantity, np.ndarray] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
         """Number of parameters, q."""
-        return 2 * len(self.names) + sum(self.sizes)
+        return 2 * len(self.names) + sum(self.sizes) + len(self.forms)
+
+    @property
+    def of_forms(self) -> slice:
+        """Which parameters are the forms'."""
+        return slice(self.count - len(self.forms), self.count)
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
@@ -144,6 +154,32 @@ class Seen:
         circle, first = self.solid.round(place_of(feature)), self.numbers(c).start
         moves = {first + i: axis for i, axis in enumerate(self.sideways(circle))}
         return circle, Point(self.centres[..., c, :], moves), self.radii[..., c], first + 2
+
+    def form(self, quantity: Quantity) -> Evaluated:
+        """The size of a form, the scene's unit."""
+        size = np.asarray(self.forms[quantity], float)
+        return Evaluated(size, {self.of_forms.start + list(self.forms).index(quantity): np.ones(size.shape)})
+
+    def magnified(self, feature: Side | Centre | Wall) -> np.ndarray:
+        """Image of a unit length across a feature at its middle, px, shape (...): of an edge in its face's plane."""
+        if isinstance(feature, Side):
+            middle = ends_of(self.solid, feature).mean(0)[None]
+            return self.per_unit(feature, middle, self.normals[..., self.names.index(feature.edge), :])[..., 0]
+        return self.camera.focal_px / self.depth(self.solid.round(place_of(feature)).centre)
+
+    def per_unit(self, side: Side, places: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """The same at places (..., n, 3) of an edge whose image has a unit normal (..., 2), shape (..., n)."""
+        step = np.cross(face_beside(self.solid, side), along_of(self.solid, side))
+        slope = self._slopes(places - self.eye[..., None, :]) @ step
+        return np.abs(np.einsum("...ni,...i->...n", slope, normal))
+
+    def _slopes(self, away: np.ndarray) -> np.ndarray:
+        """Derivative of the image by places that are so far from the sensor (..., n, 3), px, (..., n, 2, 3)."""
+        axes, focal = self.axes, self.camera.focal_px
+        z = np.einsum("...ni,...i->...n", away, axes.forward)[..., None, None]
+        screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
+        at = focal * np.einsum("...nki,...ni->...nk", np.broadcast_to(screen, (*away.shape[:-1], 2, 3)), away)
+        return (focal * screen - at[..., None] / z * axes.forward[..., None, None, :]) / z
 
     def half_angle(self, wall: Wall) -> tuple[np.ndarray, int]:
         """Of a cone (...), rad, and its number among the parameters."""

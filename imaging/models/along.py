@@ -58,6 +58,11 @@ class Along:
 
     @classmethod
     def of(cls, pictures: Pictures, *, trimmed: bool) -> Along:
+        """Found once for each set of pictures."""
+        return pictures.once(("along", trimmed), lambda: cls._of(pictures, trimmed))
+
+    @classmethod
+    def _of(cls, pictures: Pictures, trimmed: bool) -> Along:
         known = measurands(pictures)
         nodes = place_nodes(pictures, known.view, used_trims(pictures, known.view, trimmed=trimmed))
         return cls(known, nodes, *edge_contrast(pictures, known.view.names, nodes.spatial))

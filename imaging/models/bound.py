@@ -17,6 +17,7 @@ import numpy as np
 from imaging.blurred.arrangement import arrangement_of, near_pixels, near_vertices
 from imaging.blurred.model import BlurredModel, State
 from imaging.features.measurand import Measurands, measurands, normals
+from imaging.features.projected_edges import lines_alone
 from imaging.light.appearance import is_plain
 from imaging.models.edge_bound import edge_bound
 from imaging.models.errors import Errors
@@ -172,11 +173,12 @@ def response(noise: Noise, image: np.ndarray) -> tuple[Levels, np.ndarray]:
 def bound(pictures: Pictures) -> Errors:
     """The bound for arrays of pictures, one after the other.
 
-    Where things hide or shade each other, and of circles, it is that of each edge by itself.
+    Where things hide or shade each other, of circles and of the largest of some numbers, it is that of each edge by
+    itself. Of a form, a maximum less a minimum, there is no bound: its variance is that of the calibrated model.
     """
     alone = edge_bound(pictures)
     known = alone.measurands
-    if not is_plain(pictures.scene) or known.circles:
+    if not (is_plain(pictures.scene) and lines_alone(pictures.scene)):
         return alone
     lead, count, edges = alone.variance.shape, len(known.quantities), len(known.view.names)
     lines = np.full((*lead, edges, 2, 2), np.inf)
@@ -191,7 +193,7 @@ def bound(pictures: Pictures) -> Errors:
         return a * a * lines[..., 0, 0] + 2 * a * b * lines[..., 0, 1] + b * b * lines[..., 1, 1]
 
     joint = variances, variances_object
-    return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), (), joint)
+    return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), joint=joint)
 
 
 def _unit(known: Measurands) -> np.ndarray:

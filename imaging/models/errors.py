@@ -6,7 +6,7 @@ line's displacement at the edge's first end (px) and theta its rotation (rad). `
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,8 +15,11 @@ import numpy as np
 from imaging.features.circles import RimImage, rim
 from imaging.features.limbs import limb_rim
 from imaging.features.measurand import Measurands, measurands
+from imaging.models.extremes import extremes_of, largest_moments, of_largest, with_extremes
+from imaging.models.form_law import form_variances
 from imaging.pictures import Pictures
-from scenes import Circle, Curved
+from scenes import Circle, Curved, Quantity
+from scenes.measurands.features import place_of
 
 LineVariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -42,6 +45,8 @@ class Errors:
         Whether something disturbs most of each circle.
     left : tuple of ndarray, shape (...)
         Part of a whole turn that lies off the ends of each arc; 1 of whole circles and limbs.
+    forms : tuple of ndarray, shape (...)
+        Variance of each form's size, the scene's unit squared; infinite where it cannot be found.
     joint : tuple of ndarray, optional
         Variances in the image and in the object where a model finds them jointly, not edge by edge.
     """
@@ -53,17 +58,19 @@ class Errors:
     circles: tuple[np.ndarray, ...]
     crowded: tuple[np.ndarray, ...]
     left: tuple[np.ndarray, ...] = ()
+    forms: tuple[np.ndarray, ...] = ()
     joint: tuple[np.ndarray, np.ndarray] | None = None
 
     @cached_property
     def variances(self) -> np.ndarray:
         """Of all quantities in the image, px^2 (degrees^2), shape (..., M); infinite where not measurable."""
-        return self.joint[0] if self.joint else _variances(self, self.measurands.gradient)
+        return self.joint[0] if self.joint else _variances(self, self.measurands.gradient, self.measurands.value)
 
     @cached_property
     def variances_object(self) -> np.ndarray:
         """The same in the object, the scene's unit squared (degrees^2)."""
-        return self.joint[1] if self.joint else _variances(self, self.measurands.gradient_object)
+        known = self.measurands
+        return self.joint[1] if self.joint else _variances(self, known.gradient_object, known.value_object)
 
     @property
     def variance(self) -> np.ndarray:
@@ -86,6 +93,13 @@ class Errors:
         names = [*self.measurands.view.names, *self.measurands.circles]
         each = [*np.moveaxis(edges, -1, 0), *circles]
         return {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed}
+
+    def jointly(self, *, in_object: bool) -> np.ndarray:
+        """Joint covariance (M, M) of all quantities of one picture in the object or in the image, extremes by their
+        laws; infinite where not measurable."""
+        known = self.measurands
+        gradient, values = (known.gradient_object, known.value_object) if in_object else (known.gradient, known.value)
+        return with_extremes(known.quantities, values, gradient, self.covariance(gradient))[1]
 
     def covariance(self, gradient: np.ndarray) -> np.ndarray:
         """Joint covariance (..., M, M) of quantities with a gradient (..., M, q); infinite where not measurable.
@@ -123,17 +137,26 @@ def combined(
     noise = np.broadcast_to(noise_variance, contrast2.shape)
     crowded = tuple(each.crowded for each in rims)
     left = tuple(each.left for each in rims)
-    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded, left)
+    forms = form_variances(pictures, known, rims)
+    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded, left, forms)
 
 
 def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> RimImage:
     return limb_rim(pictures, each) if isinstance(each, Curved) else rim(pictures, each, fall_off=fall_off)
 
 
-def _variances(errors: Errors, gradient: np.ndarray) -> np.ndarray:
-    """Variances (..., M) of quantities with a gradient (..., M, q)."""
-    needs = errors.measurands.depends()
-    return np.stack([_variance(errors, gradient[..., m, :], needs[m]) for m in range(len(needs))], -1)
+def _variances(errors: Errors, gradient: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Variances (..., M) of quantities of some values (..., M) with a gradient (..., M, q)."""
+    needs, quantities = errors.measurands.depends(), errors.measurands.quantities
+    found = np.stack([_variance(errors, gradient[..., m, :], needs[m]) for m in range(len(needs))], -1)
+    for m, rows, sign in extremes_of(quantities):
+        joint = errors.covariance(gradient[..., rows, :])
+        if joint.ndim == 2 and np.isfinite(joint).all():
+            told = of_largest(sign * values[rows], joint)[1]
+        else:
+            told = largest_moments(sign * values[..., rows], joint)[1]
+        found[..., m] = np.where(np.isfinite(found[..., m]) & np.isfinite(told), told, np.inf)
+    return found
 
 
 def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = None) -> np.ndarray:
@@ -150,7 +173,8 @@ def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = N
 
 
 def _parts(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None) -> tuple[np.ndarray, list[np.ndarray]]:
-    """What each edge (..., E) and each circle (...) adds to it; infinite where one that it needs cannot be found."""
+    """What each edge (..., E) and each circle (...) adds to it, its form with it; infinite where one that it needs
+    cannot be found."""
     known = errors.measurands
     edges = len(known.view.names)
     offset, tilt = gradient[..., 0 : 2 * edges : 2], gradient[..., 1 : 2 * edges : 2]
@@ -164,4 +188,16 @@ def _parts(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None) -> tu
             moved = np.einsum("...i,...ij,...j->...", pull, covariance, pull)
             needed = (pull != 0).any(-1) if needs is None else needs[edges + c]
             circles.append(np.where(needed, np.where(np.isfinite(moved), moved, np.inf), 0.0))
+        for quantity, variance, pull in _forms(errors, gradient):
+            name, own = place_of(quantity.features[0]), np.where(pull != 0, pull**2 * variance, 0.0)
+            if name in known.circles:
+                circles[known.circles.index(name)] = circles[known.circles.index(name)] + own
+            else:
+                lines[..., known.view.names.index(name)] += own
     return lines, circles
+
+
+def _forms(errors: Errors, gradient: np.ndarray) -> Iterable[tuple[Quantity, np.ndarray, np.ndarray]]:
+    """Each form, its variance (...), and the derivative by its size (...)."""
+    pulls = np.moveaxis(gradient[..., errors.measurands.seen.of_forms], -1, 0)
+    return zip(errors.measurands.seen.forms, errors.forms, pulls, strict=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import sparse
 
-from imaging.features.locator import reach
+from imaging.features.locator import points_along, reach
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.estimate import Estimate, noisy
 from measure.estimators.thinning import Thinned, Thinning
@@ -24,7 +24,6 @@ from scenes import status
 if TYPE_CHECKING:
     from measure.estimators.canny import CannyLocator
 
-_FEWEST = 9  # positions on an edge, however short: fewer do not stand for the integral along it
 _MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _WHOLE = 0.9  # of what a point would count, above which it is certain
 _DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
@@ -53,13 +52,11 @@ def by_points(
 
 
 def thinned(caliper: Caliper, scale: float) -> Caliper:
-    """Positions at most 2 scales apart, and not too few: points in between add nothing (their errors are smooth)."""
+    """Positions that are enough (`imaging.features.locator.points_along`)."""
     if caliper.positions.size < 3:
         return caliper
     first, last = caliper.positions[[0, -1]]
-    return replace(
-        caliper, positions=np.linspace(first, last, max(_FEWEST, int(np.ceil((last - first) / (2 * scale))) + 1))
-    )
+    return replace(caliper, positions=np.linspace(first, last, points_along(float(last - first), scale)))
 
 
 def measurable(caliper: Caliper) -> bool:

@@ -37,7 +37,7 @@ def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> Ri
     crossings = np.nan_to_num(outline.at) - inward[:, None] * normals  # a pixel may lie between
     places, none = held(crossings + image_centre(scene.camera), optics), np.zeros(len(keep))
     locator = gradient_along(optics, np.arange(float(len(weight)))[keep], places[keep], normals[keep])
-    return RimTool(locator, np.nan_to_num(outline.design)[keep], weight[keep], none, state, optics)
+    return RimTool(locator, np.nan_to_num(outline.design)[keep], weight[keep], none, state, optics, places[keep])
 
 
 def _count(pictures: Pictures, curved: Curved, optics: Optics) -> int:

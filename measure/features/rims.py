@@ -101,6 +101,23 @@ def tells_errors(response: sparse.csr_array, clean: np.ndarray, picture: Picture
     return is_linear(*map(np.concatenate, (linear, full, found)))
 
 
+def nearest_tools(picture: Picture, name: str, found: Circles) -> list[tuple[RimTool, np.ndarray, np.ndarray] | None]:
+    """Of each image the tool by which a circle was found in it, the errors (p,) at which that expects it, and how far
+    it was found from there; None where it was not found."""
+    tools: list[tuple[RimTool, np.ndarray, np.ndarray] | None] = []
+    for errors in found.errors:
+        if not np.isfinite(errors).all():
+            tools.append(None)
+            continue
+        moved = unmoved(picture, name)
+        tool = rim_tool(picture, name, moved)
+        if _is_far(tool, errors[None])[0]:
+            moved = _rounded(tool, errors)
+            tool = rim_tool(picture, name, moved)
+        tools.append((tool, np.array(moved), errors - np.array(moved)))
+    return tools
+
+
 def unmoved(picture: Picture, name: str) -> tuple[float, ...]:
     each = picture.scene.solid.round(name)
     return (0.0,) * (each.count if isinstance(each, Curved) else 3)
@@ -206,7 +223,7 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     )  # fmt: skip
     signs = None if seen is None else np.where(seen.brightens, 1.0, -1.0)[keep]
     locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain, signs=signs)
-    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve)
+    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve.places, curve)
 
 
 def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:

@@ -70,6 +70,8 @@ class RimTool:
     state : str
         ``ok``, ``clutter``, ``low_contrast`` or ``not_visible``, as far as is known before an image.
     optics : Optics
+    places : ndarray, shape (m, 2)
+        In the recorded image, px.
     curve : Curve, optional
         Of a circle, whose ``inward`` leaves out what depends on where it is found.
     """
@@ -80,6 +82,7 @@ class RimTool:
     inward: np.ndarray
     state: str
     optics: Optics
+    places: np.ndarray
     curve: Curve | None = None
 
     def solve(self, fit: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -89,12 +92,17 @@ class RimTool:
         """
         found = np.einsum("nim,nm->ni", fit, offset + self.inward)
         for _ in range(_PASSES if self.curve else 0):
-            near = np.nan_to_num(found)
-            near = np.where(np.abs(near @ self.design.T).max(-1, keepdims=True) <= _NEAR, near, 0.0)
-            second = self.curve.second_order(near)
-            more = second + self.curve.sampled(near @ self.design.T + second, self.optics)
-            found = np.einsum("nim,nm->ni", fit, offset + self.inward - more)
+            found = np.einsum("nim,nm->ni", fit, offset + self.inward - self.beside(found))
         return found
+
+    def beside(self, found: np.ndarray) -> np.ndarray:
+        """How far outwards crossings (n, m) of circles with errors (n, p) lie beside the first order, ideal px."""
+        if self.curve is None:
+            return np.zeros((len(found), len(self.design)))
+        near = np.nan_to_num(found)
+        near = np.where(np.abs(near @ self.design.T).max(-1, keepdims=True) <= _NEAR, near, 0.0)
+        second = self.curve.second_order(near)
+        return second + self.curve.sampled(near @ self.design.T + second, self.optics)
 
     @cached_property
     def response(self):

@@ -21,9 +21,12 @@ from imaging.features.rim_sides import outward_normals
 from imaging.geometry.lens import undistorted
 from imaging.geometry.projection import edge_points, project_ideal
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
+from imaging.models.form_law import residues
 from imaging.pictures import Pictures
 from planner.budgeting.station import Station
-from scenes import Curved
+from scenes import Curved, Quantity
+from scenes.measurands.features import place_of
+from scenes.measurands.form import reference_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +50,12 @@ class Features:
         """Errors of lines and circles, as numbered in `imaging.features.seen`, shape (q,).
 
         Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
-        circle's centre in its plane and change of its radius (the scene's unit). NaN where a feature is not seen.
+        circle's centre in its plane and change of its radius (the scene's unit); the zones of forms, with the sign of
+        the farthest point's side (the scene's unit). NaN where a feature is not seen.
         """
         parts = [self._lines(station).ravel()]
         parts += [self._circle(station, c) for c in range(len(self.known.circles))]
+        parts.append(np.array([self._form(station, quantity) for quantity in self.known.seen.forms]))
         return np.concatenate(parts)
 
     @cached_property
@@ -102,6 +107,40 @@ class Features:
         points, normal, fit = self._rims[c]
         off = np.einsum("ni,ni->n", self._displaced(station, points), normal)
         return fit @ off
+
+    def _form(self, station: Station, quantity: Quantity) -> float:
+        """Of points that a perfect feature has elsewhere: their zone, which is as large to either side of an input."""
+        name = place_of(quantity.features[0])
+        if name in self.known.circles:
+            off, design = self._beside_rim(station, self.known.circles.index(name))
+        else:
+            off, design = self._beside_edge(station, quantity)
+        if reference_of(quantity) != "nominal" and len(off):
+            off = residues(design) @ off
+        if not (len(off) and np.isfinite(off).all()):
+            return np.nan
+        size = 2 * np.abs(off).max() if reference_of(quantity) == "nominal" else np.ptp(off)
+        return float(size * np.sign(off[np.abs(off).argmax()]))
+
+    def _beside_edge(self, station: Station, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
+        """Distances of an edge's points, the scene's unit, and the design of its line."""
+        view = self.known.view
+        e = view.names.index(place_of(quantity.features[0]))
+        nodes, points = self._nodes
+        normal = normals(view)[e]
+        scale = self.known.seen.per_unit(quantity.features[0], points[e], normal)
+        off = self._displaced(station, points[e]) @ normal / scale
+        return off, np.stack([np.ones(off.size), nodes.t[e, 1:-1]], -1)
+
+    def _beside_rim(self, station: Station, c: int) -> tuple[np.ndarray, np.ndarray]:
+        """Outward distances of a circle's points that are used, the scene's unit, and the design of its circle."""
+        points, normal, fit = self._rims[c]
+        used = (fit != 0).any(0) & np.isfinite(fit).all()
+        each = self.pictures.scene.solid.round(self.known.circles[c])
+        image = limb_rim(self.pictures, each) if isinstance(each, Curved) else rim(self.pictures, each)
+        design = image.design[used]
+        off = np.einsum("ni,ni->n", self._displaced(station, points), normal)[used]
+        return off / design[:, 2], design[:, :3] / design[:, 2:3]
 
     def _displaced(self, station: Station, points: np.ndarray) -> np.ndarray:
         """How far off points (..., 3) are found, ideal px of the believed camera, shape (..., 2)."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from imaging.features.locator import MIN_USABLE, correlation
 from imaging.features.measurand import Measurands, measurands
-from imaging.features.projected_edges import circles, image_fractions
+from imaging.features.projected_edges import image_fractions, lines_alone
 from imaging.geometry.projection import facing
 from imaging.light.appearance import edge_distance2, is_separable, of_sides, paper_step, side_strengths
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
@@ -71,7 +71,7 @@ class BestPair:
 
 def has_bound(scene: Scene, model: str) -> bool:
     """Whether the fast search applies: a separable scene, straight edges only."""
-    return is_separable(scene) and not circles(scene) and model in ("paper", "calibrated")
+    return is_separable(scene) and lines_alone(scene) and model in ("paper", "calibrated")
 
 
 def exhaustive(

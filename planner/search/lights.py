@@ -17,7 +17,7 @@ import numpy as np
 
 from imaging.features.locator import MIN_CONTRAST
 from imaging.features.measurand import measurands
-from imaging.features.projected_edges import circles
+from imaging.features.projected_edges import lines_alone
 from imaging.geometry.projection import edge_points
 from imaging.light.appearance import of_sides, side_signals
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
@@ -95,7 +95,7 @@ class Shared:
 
 def applies(scene: Scene, model: str) -> bool:
     """Whether contrasts of single lights tell of mixtures: the calibrated model, straight edges, two lights."""
-    return model == "calibrated" and not circles(scene) and len(scene.lights) == 2
+    return model == "calibrated" and lines_alone(scene) and len(scene.lights) == 2
 
 
 def best_lights(problem: SearchProblem, grid: Grid, shares: str, report: Report) -> Shared:

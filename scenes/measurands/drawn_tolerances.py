@@ -11,7 +11,7 @@ import numpy as np
 from scenes.measurands.between import CentreLine, SquareAt, Through
 from scenes.measurands.drawn_faces import SAME, Faces, centres, limited, sides
 from scenes.measurands.drawn_places import Place, pattern_of, places_of
-from scenes.measurands.features import along_of
+from scenes.measurands.features import along_of, face_beside
 from scenes.measurands.measurands import Measurand
 from scenes.parts.pmi import Characteristic
 from scenes.parts.solid import Edge
@@ -20,9 +20,9 @@ from scenes.units import Unit, in_unit
 
 _MOST = 8  # measurands that are offered for one feature
 _OFF = 1e-3  # degrees: of an angle that the model has
-_SURFACE = {"flatness", "cylindricity", "profile of a surface", "circular runout", "total runout", "straightness"}
+_SURFACE = {"flatness", "cylindricity", "profile of a surface", "circular runout", "total runout"}
 _INSIDE = "it needs the form of a whole surface, which edges in a picture do not show"
-_NOT_YET = "not yet among the kinds of measurand"
+_OF_THE_SCENE = "its zone is about a place in its datums, and kind profile is about the scene's own"
 _NO_ZONE = "the file gives no size of the zone"
 _ZERO = "its zone is 0 at maximum material: write it with tolerance 0 and the name of its size (maximum_material)"
 _NO_FACES = "the file says of no face what it is of"
@@ -31,8 +31,12 @@ _NO_DATUM = "the file says of no face what datum {} is"
 _ELSEWHERE = "no edge or circle of it lies in one plane with those of its datums"
 _FACE_ONLY = "its datums fix no place in the plane in which it shows"
 _ONE_WAY = "its zone is between two planes, and the file does not say which way they stand"
+_GENERATRIX = "the lines along a curved wall, and its axis, are no edges of the part"
+_NO_EDGE = "no straight edge of it shows how far its lines bend"
+_NO_RIM = "no rim of it is an edge of the part"
 _NO_RIMS = "no whole rim of it, or of its datum, is an edge of the part"
-_KINDS = {"concentricity", "coaxiality", "position", "perpendicularity", "parallelism", "angularity", "symmetry"}
+_KINDS = {"concentricity", "coaxiality", "position", "perpendicularity", "parallelism", "angularity", "symmetry",
+          "straightness", "roundness"}  # fmt: skip
 
 Found = tuple[tuple[Measurand, ...], ...]
 
@@ -67,7 +71,7 @@ def toleranced(known: Faces, each: Characteristic, datums: dict[str, tuple[int, 
         The part's.
     """
     if each.kind not in _KINDS:
-        return _INSIDE if each.kind in _SURFACE else _NOT_YET
+        return _INSIDE if each.kind in _SURFACE else _OF_THE_SCENE  # profile of a line
     if not each.zone:
         return _ZERO if each.zone == 0 and "M" in each.modifiers else _NO_ZONE
     lost = [letter for letter in _letters(each) if not known.of(datums.get(letter, ()))]
@@ -83,6 +87,7 @@ def toleranced(known: Faces, each: Characteristic, datums: dict[str, tuple[int, 
     rows = {
         "position": _positions, "concentricity": _concentric, "coaxiality": _concentric, "symmetry": _symmetric,
         "perpendicularity": _turned, "parallelism": _turned, "angularity": _turned,
+        "straightness": _straight, "roundness": _round,
     }[each.kind]  # fmt: skip
     found = rows(asked)
     if isinstance(found, str):
@@ -266,3 +271,24 @@ def _turned_about(asked: _Asked, plane: Plane, datum: list[Plane]) -> list[Measu
         limit = float(np.degrees(np.arctan2(asked.size, known.solid.length(pair[0]))))
         found.append(limited(asked.each, "angle", sides(*pair), " ".join(edge.name for edge in pair), limit, limit))
     return found
+
+
+def _straight(asked: _Asked) -> list[list[Measurand]] | str:
+    """Of planes by edges that bend as they do: in a face that stands across, the longest first."""
+    if not asked.planes:
+        return _GENERATRIX
+    known, found = asked.known, []
+    for plane in asked.planes:
+        edges = sorted(known.edges_in(plane), key=lambda edge: -known.solid.length(edge))
+        across = [e for e in edges if abs(face_beside(known.solid, sides(e)[0]) @ plane.normal) <= SAME]
+        found.append([asked.made("straightness", sides(edge), edge.name) for edge in across])
+    return found if any(found) else _NO_EDGE
+
+
+def _round(asked: _Asked) -> list[list[Measurand]] | str:
+    """Of bores and shafts by a rim, whole ones first."""
+    found = []
+    for wall in asked.walls:
+        rims = sorted(asked.known.rims_of(wall), key=lambda rim: rim.ends is not None)
+        found.append([asked.made("roundness", centres(rim), rim.name) for rim in rims])
+    return found if any(found) else _NO_RIM

@@ -218,7 +218,8 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
 
     The plane of its features: that of a circle if all lies in it, else the one that its centre and an edge span, whose
     heights may differ; of at least three circles in parallel planes the one that is parallel to these. Two points span
-    none: theirs is the plane of the one face that has both. None where there is no such plane or there are several.
+    none: theirs is the plane of the one face that has both. A single edge's is that of the larger face beside it. None
+    where there is no such plane or there are several.
     """
     features = basic_of(quantity.features)
     circles = [solid.circle(f.circle) for f in features if isinstance(f, Centre)]
@@ -231,11 +232,20 @@ def plane_of(solid: Solid, quantity: Quantity) -> np.ndarray | None:
         return circles[0].axis if flat or are_level(circles, features) else _spanned(points, near)
     if len(points) > 2:
         return np.linalg.svd(points - points.mean(0))[2][2]
+    if isinstance(features[0], Side):
+        return face_beside(solid, features[0])
     ends = [solid.vertex_names.index(f.vertex) for f in features]
     faces = sorted(set.intersection(*(solid.faces_at[end] for end in ends)))
     normals = solid.normals[faces]
     alike = len(faces) and (np.abs(normals @ normals[0]) > 1 - 1e-12).all()
     return normals[0] if alike else None
+
+
+def face_beside(solid: Solid, side: Side) -> np.ndarray:
+    """Unit normal of the larger of the two faces that meet in an edge, shape (3,)."""
+    faces = sorted(set(solid.edge(side.edge).faces))
+    shares = solid.areas[faces] / solid.areas[faces].max()
+    return solid.normals[faces[int(shares.round(_DIGITS).argmax())]]
 
 
 def are_level(circles: list[Circle], features: tuple) -> bool:

@@ -60,6 +60,15 @@ class MeasurandKind:
 
     0 for a dimension. ``tolerance`` of a measurand is then the zone's diameter or width.
     """
+    is_form: ClassVar[bool] = False
+    """Whether it is about all points of a feature (`scenes.measurands.form`)."""
+
+    is_chain: ClassVar[bool] = False
+    """Whether it is of other measurands' numbers (`scenes.measurands.chain`)."""
+
+    extreme: ClassVar[int] = 0
+    """Of a chain +1 where it is the largest of its numbers, -1 where it is the smallest: not normal if several may be
+    it."""
 
     takes_material: ClassVar[bool] = False
     """Whether its zone may grow with a feature's size (`scenes.measurands.material`)."""
@@ -112,7 +121,8 @@ class MeasurandKind:
         if not self.zone:
             return None
         names = tuple(f"{measurand.name}.{part}" for part in self.parts) or (measurand.name,)
-        return Zone(measurand.name, measurand.kind, names, self.zone, measurand.tolerance and measurand.tolerance.plus)
+        size = measurand.tolerance and measurand.tolerance.plus
+        return Zone(measurand.name, measurand.kind, names, self.zone, size, is_form=self.is_form)
 
     def in_image(self, seen: Any, quantity: Quantity) -> Evaluated:
         """Value and derivatives in the image: px, or degrees."""

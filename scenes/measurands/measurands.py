@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from scenes.measurands.between import AnyFeature, Crossing
+from scenes.measurands.chain import linked
 from scenes.measurands.features import Basic, Between, Centre, Corner, Feature, Side, basic_of, place_of
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.zone import Zone
@@ -59,6 +60,10 @@ class Quantity:
     tolerance : Tolerance or None
     weight : float
         In the planner's weighted sum.
+    terms : tuple of Quantity
+        Of a chain (`scenes.measurands.chain`) the numbers that it is made of; its features are theirs.
+    signs : tuple of int
+        Of a chain +1 for each number that it adds, -1 for one that it takes off.
     """
 
     name: str
@@ -67,6 +72,8 @@ class Quantity:
     nominal: float | None = None
     tolerance: Tolerance | None = None
     weight: float = 1.0
+    terms: tuple[Quantity, ...] = ()
+    signs: tuple[int, ...] = ()
 
     @property
     def edges(self) -> tuple[str, ...]:
@@ -87,7 +94,15 @@ class Quantity:
     @property
     def is_angle(self) -> bool:
         """Whether its unit is degrees."""
-        return MEASURANDS[self.kind].is_angle
+        return self.terms[0].is_angle if self.terms else MEASURANDS[self.kind].is_angle
+
+    @property
+    def told_of(self) -> str:
+        """Of what it is, in words: its features, or the numbers of a chain."""
+        if not self.terms:
+            return " to ".join(map(place_of, self.features))
+        signs = ("" if sign > 0 else "less " for sign in self.signs)
+        return ", ".join(f"{sign}{term.name}" for sign, term in zip(signs, self.terms, strict=True))
 
     @property
     def axis(self) -> int:
@@ -118,15 +133,23 @@ class Measurand(Model):
     in a datum system of two features, an edge and an edge or a point, or a point and a point or an edge, as NAME.x and
     NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, the middle of a slot or the centre of a
     pattern among them, as NAME.x and NAME.y; ``symmetry`` of a line or a point about a line; ``parallelism`` and
-    ``perpendicularity`` of an edge to a datum edge.
+    ``perpendicularity`` of an edge to a datum edge; forms, of all points of a feature: ``straightness`` of an edge,
+    ``roundness`` of a circle, an arc or a ball.
+
+    Chains, of the numbers of measurands before it that ``of`` names: ``mean``, ``sum`` (less those that ``minus``
+    names), ``largest``, ``smallest``.
     """
 
     name: Title
     """What the drawing calls it; different for each."""
     kind: Annotated[str, NameOf(MEASURANDS)]
     """What is measured of the features."""
-    features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=64)]
-    """Corners, circles and edges, or what lies between some, in the order that the kind asks for."""
+    features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=64)] = ()
+    """Corners, circles and edges, or what lies between some, in the order that the kind asks for; none of a chain."""
+    of: Annotated[tuple[Name, ...], Field(max_length=64)] = ()
+    """Of a chain: names of the numbers that it is made of (NAME, or NAME.part), which are listed before it."""
+    minus: Annotated[tuple[Name, ...], Field(max_length=64)] = ()
+    """Of a sum: names of those that are taken off."""
     nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Coordinate, Coordinate] | None = None
     """The value that is wanted, the scene's unit or degrees; two for a place; the object's own if left out."""
     tolerance: Annotated[Tolerance | None, BeforeValidator(_both_ways)] = None
@@ -145,7 +168,9 @@ class Measurand(Model):
             raise ValueError(f"name must be a printable text, got {self.name!r}")
         if not kind.takes(self.features):
             got = ", ".join(" ".join(feature.edges) for feature in self.features)
-            raise ValueError(f"features must be {kind.wanted} for kind {self.kind}, got {got}")
+            raise ValueError(f"features must be {kind.wanted} for kind {self.kind}, got {got or 'none'}")
+        if (self.of or self.minus) and not kind.is_chain:
+            raise ValueError(f"of must be left out for kind {self.kind}, got {', '.join(self.of + self.minus)}")
         count = 0 if self.nominal is None else len(self.nominal) if isinstance(self.nominal, tuple) else 1
         if self.nominal is not None and count != kind.nominals:
             number = ("left out", "one number", "two numbers")[kind.nominals]
@@ -208,9 +233,15 @@ class Task(Model):
 
 @lru_cache(maxsize=256)
 def quantities_of(task: Task | None, measurands: tuple[Measurand, ...]) -> tuple[Quantity, ...]:
-    """All numbers that a scene asks for."""
-    found = sum((measurand.quantities for measurand in measurands), () if task is None else (task.quantity,))
-    return widened(found, measurands)
+    """All numbers that a scene asks for; ValueError where a chain's are not there."""
+    found = [] if task is None else [task.quantity]
+    for i, measurand in enumerate(measurands):
+        known = {each.name: each for each in found}
+        for number in measurand.quantities:
+            is_chain = bool(measurand.of + measurand.minus)
+            key = f"measurands[{i}]"
+            found.append(linked(number, measurand.of, measurand.minus, known, key) if is_chain else number)
+    return widened(tuple(found), measurands)
 
 
 def widened(quantities: tuple[Quantity, ...], measurands: tuple[Measurand, ...]) -> tuple[Quantity, ...]:

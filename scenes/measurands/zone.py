@@ -1,4 +1,4 @@
-"""The zone of a geometric tolerance (ISO 1101): what several numbers of a measurand keep together."""
+"""The zone of a geometric tolerance (ISO 1101): what several numbers of a measurand, or all points, keep together."""
 
 from __future__ import annotations
 
@@ -46,6 +46,8 @@ class Zone:
         What the drawing allows: diameter or width, the scene's unit; at maximum material, where it grows.
     material : Material, optional
         What it grows with.
+    is_form : bool
+        Whether it is of all points of a feature (`scenes.measurands.form`).
     """
 
     name: str
@@ -54,11 +56,12 @@ class Zone:
     factor: float
     size: float | None
     material: Material | None = None
+    is_form: bool = False
 
     @property
     def is_joint(self) -> bool:
-        """Whether no number alone says that it is kept."""
-        return len(self.parts) > 1 or self.material is not None
+        """Whether no normal number alone says that it is kept: it is decided by a law of its own."""
+        return len(self.parts) > 1 or self.is_form or self.material is not None
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -67,5 +70,5 @@ class Zone:
 
 
 def joint_parts(zones: Iterable[Zone]) -> frozenset[str]:
-    """Names of the numbers that nothing is decided of alone."""
+    """Names of the numbers that nothing is decided of alone, or not by a normal law."""
     return frozenset(name for zone in zones if zone.is_joint for name in zone.parts)

@@ -181,10 +181,19 @@ class Solid:
     @cached_property
     def normals(self) -> np.ndarray:
         """Outward unit normal of each face, shape (F, 3)."""
+        return self._areas / np.linalg.norm(self._areas, axis=1, keepdims=True)
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """Of each face, shape (F,)."""
+        return np.linalg.norm(self._areas, axis=1) / 2
+
+    @cached_property
+    def _areas(self) -> np.ndarray:
+        """Along each face's normal, twice its area, shape (F, 3)."""
         corners = self.triangles
         areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
-        normal = summed_areas(areas, self.triangle_faces, len(self.faces))
-        return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        return summed_areas(areas, self.triangle_faces, len(self.faces))
 
     @cached_property
     def triangle_corners(self) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from tests.proofs.conditions import conditions
 from tests.proofs.corpus import corpus
 from tests.proofs.crowded import crowded
 from tests.proofs.fits import fits
+from tests.proofs.form import form
 from tests.proofs.hollow import hollow
 from tests.proofs.installed import installed
 from tests.proofs.kill import kill
@@ -39,6 +40,7 @@ app.command()(conditions)
 app.command()(corpus)
 app.command()(crowded)
 app.command()(fits)
+app.command()(form)
 app.command()(hollow)
 app.command()(installed)
 app.command()(kill)

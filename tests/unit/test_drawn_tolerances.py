@@ -134,6 +134,28 @@ def test_rims_about_one_axis(tmp_path):
     assert [radii[each.circle] for each in found.candidates[0][0].features] == pytest.approx([40.0, 12.0])
 
 
+def test_straightness_of_a_plane(block):
+    """By edges of the plane whose other face is the larger one, so that they are seen to bend as the plane does."""
+    found = asked(block, "straightness", [FRONT], ())
+    assert told(found) == ("straightness", 0.2)
+    solid = block.solid
+    for measurand in found.candidates[0]:
+        (edge,) = (solid.edge(feature.edge) for feature in measurand.features)
+        assert solid.vertices[list(edge.ends)][:, 1] == pytest.approx([0.0, 0.0])
+        other = [face for face in edge.faces if not np.allclose(solid.normals[face], (0, -1, 0))]
+        assert solid.areas[other[0]] > min(solid.areas[list(edge.faces)])
+    lengths = [solid.length(solid.edge(each.features[0].edge)) for each in found.candidates[0]]
+    assert lengths == sorted(lengths, reverse=True)
+
+
+def test_roundness_of_a_bore(block):
+    """By either of its rims."""
+    found = asked(block, "roundness", [4.0], ())
+    assert told(found) == ("roundness", 0.2)
+    radii = {circle.name: circle.radius for circle in block.solid.circles}
+    assert [radii[each.features[0].circle] for each in found.candidates[0]] == pytest.approx([4.0, 4.0])
+
+
 @pytest.mark.parametrize(
     ("kind", "of", "datums", "facts", "reason"),
     [
@@ -145,7 +167,10 @@ def test_rims_about_one_axis(tmp_path):
         ("perpendicularity", [4.0], (TOP,), {"is_round": True}, "the direction of an axis"),
         ("perpendicularity", [FRONT], (), {}, "no edge or circle of it lies in one plane"),
         ("flatness", [TOP], (), {}, "form of a whole surface"),
-        ("roundness", [4.0], (), {}, "not yet among the kinds"),
+        ("total runout", [4.0], (), {}, "form of a whole surface"),
+        ("profile of a line", [TOP], (FRONT,), {}, "about a place in its datums"),
+        ("straightness", [4.0], (), {}, "are no edges of the part"),
+        ("roundness", [TOP], (), {}, "no rim of it is an edge"),
     ],
 )
 def test_reasons(block, kind, of, datums, facts, reason):

@@ -73,10 +73,22 @@ def _below(rows: list[dict[str, Any]], edges: list[str], terms: str, offers: boo
     """What stands below the table; ``offers`` to simulate, where that would tell more."""
     every = [each for row in rows for each in row["measurands"]]
     yield f"{PLACES} {terms}"
+    yield from _zones(every)
     yield from legend([each["status"] for each in every], [f"{e['name']}: {e['reason']}" for e in every])
     yield from edges
     if offers and any(each["status"] == CLUTTER for each in every):
         yield _RENDER
+
+
+def _zones(every: list[dict[str, Any]]) -> Iterator[str]:
+    """Of the first forms, what noise makes of a perfect feature: `ice measure` takes its mean off."""
+    forms = [each for each in every if "noise_zone" in each]
+    for each in forms[:_MOST_TOLD]:
+        zone, unit = each["noise_zone"], each["unit"]
+        yield (
+            f"{each['name']}: by noise {zone['points']} points of a perfect feature seem to need "
+            f"{zone['mean']:.3g} {unit}, in 95 % no more than {zone['at_most']:.3g}."
+        )
 
 
 def doubtful_edges(found: list[Prediction]) -> list[str]:
@@ -115,11 +127,19 @@ def _facts(picture: scenes.Picture, found: Prediction) -> dict[str, Any]:
                 "name": each.name, "kind": each.kind, "unit": each.unit, "value": each.value_object,
                 "variance": each.variance_object, "bias": each.bias_object, "value_image": each.value_image,
                 "variance_image": each.variance_image, "bias_image": each.bias_image, "status": each.status,
-                "reason": each.reason, "u_bias": None,
+                "reason": each.reason, "u_bias": None, **_zone_of_noise(found, each.name),
             }
             for each in found.measurands
         ],
     })  # fmt: skip
+
+
+def _zone_of_noise(found: Prediction, name: str) -> dict[str, Any]:
+    """Of a form the zone that noise makes of a perfect feature."""
+    law = found.forms.get(name)
+    if law is None:
+        return {}
+    return {"noise_zone": {"mean": law.noise.mean, "at_most": law.noise.quantile(0.95), "points": len(law.at)}}
 
 
 def _simulated(

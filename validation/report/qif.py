@@ -73,17 +73,21 @@ class _Row:
 
 
 def _rows(found: Inspection) -> list[_Row]:
-    """Every number, and every zone that several of them keep together."""
+    """Every number, and every zone that several of them keep together; a form's number with its zone's limits."""
     joint = joint_parts(each.zone for each in found.zones)
+    forms = {each.zone.name: each for each in found.zones if each.zone.is_form}
     rows = []
     for row in found.rows:
         told = row.requirement
         kind, zone = MEASURANDS[told.kind], None if told.name in joint else told.tolerance
         of = kind.qif or ("UserDefinedAngular" if kind.is_angle else "UserDefinedLinear")
         limits = None if zone is None else (-zone.minus, zone.plus)
+        decision, form = row.decision, forms.get(told.name)
+        if form is not None:
+            limits, decision = form.zone.size and (0.0, form.zone.size), form.decision
         rows.append(_Row(of, str(told.number), told.name, told.kind, told.nominal, limits, row.value, row.u, told.U,
-                         row.decision, told.status, told.reason))  # fmt: skip
-    for each in found.zones:
+                         decision, told.status, told.reason))  # fmt: skip
+    for each in (each for each in found.zones if not each.zone.is_form):
         told = each.facts
         limits = None if told["size"] is None else (0.0, told["size"])
         rows.append(_Row("UserDefinedLinear", "", told["name"], told["kind"], 0.0, limits, told["value"], told["u"],

@@ -11,7 +11,6 @@ from rich.console import Group
 from rich.text import Text
 
 from scenes import Curved, Mesh, Scene
-from scenes.measurands.features import place_of
 from scenes.measurands.measurands import quantities_of
 from scenes.parts.recognised import Recognised, cylinders
 from scenes.parts.solid import Circle, Edge, Solid
@@ -131,7 +130,7 @@ def _requirements(scene: Scene) -> Iterator[tuple[str, ...]]:
         yield (
             each.name,
             each.kind,
-            " to ".join(map(place_of, each.features)),
+            each.told_of,
             f"{zone(each.tolerance)} {unit}".replace("±", "+-"),
         )
 
