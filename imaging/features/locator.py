@@ -14,6 +14,8 @@ CLEARANCE = 3.5  # standard deviations of the smoothed edge that a neighbouring 
 
 MIN_CONTRAST = 5.0  # contrast / noise below which a locator's error is no longer linear in the noise
 MIN_USABLE = 2.0  # px of an edge that must be left after trimming
+SPACING = 2.0  # smoothing scales between edge points around a rim or limb: between them errors are smooth
+MOST_PLACES = 64  # times the planner's places, of those that are measured
 _FEWEST = 9  # points on an edge, however short: fewer do not stand for the integral along it
 
 

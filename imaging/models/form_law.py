@@ -16,7 +16,15 @@ import numpy as np
 from imaging.features.circles import LEAST_SEEN, RimImage, rim
 from imaging.features.limb_outline import limb_outline
 from imaging.features.limbs import limb_rim
-from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kappa2, points_along
+from imaging.features.locator import (
+    MIN_CONTRAST,
+    MIN_USABLE,
+    MOST_PLACES,
+    SPACING,
+    correlation,
+    kappa2,
+    points_along,
+)
 from imaging.features.measurand import Measurands, measurands, normals
 from imaging.features.rim_look import places_around
 from imaging.geometry.projection import edge_points
@@ -27,8 +35,6 @@ from scenes import Circle, Curved, Quantity
 from scenes.measurands.features import place_of
 from scenes.measurands.form import Reference, reference_of
 
-SPACING = 2.0  # smoothing scales between points: between them errors are smooth
-MOST_PLACES = 64  # times the places that the planner takes on a rim
 CLEAREST = 2 * MIN_CONTRAST  # contrast / noise that a point needs: an extreme shows what in a mean averages out
 LEAST_CLEAR = 0.5  # part of the places that must have it
 _WORST = 8.0  # exponent of the mean of unequal standard deviations that an extreme of many points goes with

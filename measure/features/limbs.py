@@ -11,16 +11,13 @@ import numpy as np
 from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
 from imaging.features.limb_look import LimbLook, clear_of_others, limb_look, seen_along
 from imaging.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_ends, limb_outline
-from imaging.features.locator import MIN_CONTRAST, edge_blur
+from imaging.features.locator import MIN_CONTRAST, MOST_PLACES, SPACING, edge_blur
 from imaging.geometry.lens import image_centre
 from imaging.pictures import Pictures
 from measure.estimators.gradient import gradient_along
 from measure.features.optics import Optics
 from measure.features.tools import RimTool, held
 from scenes import Curved, Picture, status
-
-_SPACING = 2.0  # smoothing scales between places
-_MOST = 64  # times the planner's places
 
 
 def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> RimTool:
@@ -41,9 +38,9 @@ def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> Ri
 
 
 def _count(pictures: Pictures, curved: Curved, optics: Optics) -> int:
-    """Places about `_SPACING` smoothing scales apart, a multiple of the planner's."""
+    """Places about `SPACING` smoothing scales apart, a multiple of the planner's."""
     length = np.nansum(limb_outline(curved, pictures.sensors, pictures.scene.camera).arc)
-    return LIMB_POINTS * int(np.clip(np.ceil(length / (_SPACING * optics.scale_px * LIMB_POINTS)), 1, _MOST))
+    return LIMB_POINTS * int(np.clip(np.ceil(length / (SPACING * optics.scale_px * LIMB_POINTS)), 1, MOST_PLACES))
 
 
 def _weights(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook | None) -> tuple[np.ndarray, str]:

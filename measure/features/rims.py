@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
-from imaging.features.locator import MIN_CONTRAST, edge_blur, reach
+from imaging.features.locator import MIN_CONTRAST, MOST_PLACES, SPACING, edge_blur, reach
 from imaging.features.rim_look import RimLook, look, places_around
 from imaging.features.rim_outline import facets, smooth_outline
 from imaging.features.rim_sides import clearance, outward_normals, seen_along, within_ends
@@ -27,8 +27,6 @@ from measure.features.rim_noise import Drawn, Stack, drawn, is_linear
 from measure.features.tools import Curve, RimTool, held
 from scenes import Circle, Curved, Picture, status
 
-SPACING = 2.0  # smoothing scales between edge points: between them errors are smooth
-_MOST = 64  # times the planner's places
 _FINER = 3  # times as many on an arc
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
 _MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
@@ -233,10 +231,10 @@ def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
     predicted to, within a small part of `SPACING`.
     """
     if circle.ends is None:
-        return places_around(pictures, circle, SPACING * optics.scale_px, _MOST)
+        return places_around(pictures, circle, SPACING * optics.scale_px, MOST_PLACES)
     if pictures.lights:
         return look(pictures, circle).shift.size
-    return places_around(pictures, circle, SPACING / _FINER * optics.scale_px, _MOST)
+    return places_around(pictures, circle, SPACING / _FINER * optics.scale_px, MOST_PLACES)
 
 
 def _with_errors(circle: Circle, errors: tuple[float, ...]) -> Circle:

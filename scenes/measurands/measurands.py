@@ -144,7 +144,7 @@ class Measurand(Model):
     """What the drawing calls it; different for each."""
     kind: Annotated[str, NameOf(MEASURANDS)]
     """What is measured of the features."""
-    features: Annotated[tuple[AnyFeature, ...], Field(min_length=1, max_length=64)] = ()
+    features: Annotated[tuple[AnyFeature, ...], Field(max_length=64)] = ()
     """Corners, circles and edges, or what lies between some, in the order that the kind asks for; none of a chain."""
     of: Annotated[tuple[Name, ...], Field(max_length=64)] = ()
     """Of a chain: names of the numbers that it is made of (NAME, or NAME.part), which are listed before it."""

@@ -203,3 +203,10 @@ def test_a_chain_needs_what_its_numbers_need(plate):
     lying = plate.with_(camera={"exposure": plate.camera.exposure / 30})
     states = {each.name: each.status for each in planner.predict(lying, (60, 300), (60, 350)).measurands}
     assert states["wall"] == worst(*(states[name] for name in ("apart", "rb", "rc"))) != "ok"
+
+
+def test_a_scene_is_read_back_as_it_is_written(plate):
+    """With all its keys, and without those that are not said."""
+    for form in (plate.model_dump(mode="json"), plate.model_dump(mode="json", exclude_defaults=True)):
+        again = scenes.Scene.model_validate(form)
+        assert [each.terms for each in again.quantities] == [each.terms for each in plate.quantities]
