@@ -150,10 +150,23 @@ def independent(
     how = how.by(*methods)
     others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
     images = _completed(picture, others, measured, how)
-    return tuple(
-        measure.correction(images, picture, each.locator, each.threshold, told)
-        for each, told in zip(methods, propagated, strict=True)
-    )
+    settled, found = cache(partial(_settled, picture, images, how)), []
+    for each, told in zip(methods, propagated, strict=True):
+        of = partial(_told_by, picture, each, told)
+        found.append(_sure(picture, of(images), of, settled))
+    return tuple(found)
+
+
+def _told_by(picture: Picture, method: Method, told: PropagatedValues, images: Images) -> Correction:
+    return measure.correction(images, picture, method.locator, method.threshold, told)
+
+
+def _sure(
+    picture: Picture, found: Correction, of: Callable[[Images], Correction], settled: Callable[[], Images]
+) -> Correction:
+    """A correction; where it does not know a bias well enough, up to a megapixel, that of settled images."""
+    doubtful = [state == CLUTTER and known for state, known in zip(found.status, np.isfinite(found.bias), strict=True)]
+    return of(settled()) if any(doubtful) and _is_below(picture, LARGE) else found
 
 
 def of_render(
@@ -210,33 +223,28 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
     Beside it what propagation says of the mean of the first of these renders.
     """
 
-    def of(images: Images, told: PropagatedValues) -> Correction:
-        return measure.correction(images, picture, method.locator, method.threshold, told)
-
     def propagated(renders: tuple[np.ndarray, ...]) -> PropagatedValues:
         clean = np.mean(renders, axis=0)
         return measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
-
-    def sure(found: Correction, images: Images, told: PropagatedValues) -> Correction:
-        doubtful = _is_doubtful(found) and _is_below(picture, LARGE)
-        return of(_settled(picture, images, how), told) if doubtful else found
 
     images = None
     pair = how.by_pixel and not _is_below(picture, LARGE_RANDOM)  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
         images, told = _completed(picture, few, (), how), propagated(few)
-        found = of(images, told)
+        of = partial(_told_by, picture, method, told)
+        found = of(images)
         if _is_quiet(found):
-            return sure(found, images, told), told
+            return _sure(picture, found, of, partial(_settled, picture, images, how)), told
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
     told = propagated(renders)
-    found = of(images, told)
+    of = partial(_told_by, picture, method, told)
+    found = of(images)
     while len(images.renders) < _MOST and not _is_quiet(found):
         images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
-        found = of(images, told)
-    return sure(found, images, told), told
+        found = of(images)
+    return _sure(picture, found, of, partial(_settled, picture, images, how)), told
 
 
 def _settled(picture: Picture, images: Images, how: How) -> Images:
@@ -267,11 +275,6 @@ def _is_quiet(found: Correction) -> bool:
     limit = np.maximum(_QUIET * found.sigma, _OF_TOLERANCE * tolerances)
     noise = found.sources[RENDERING]
     return bool((noise <= limit)[np.isfinite(noise) & np.isfinite(found.sigma)].all())
-
-
-def _is_doubtful(found: Correction) -> bool:
-    """Whether a bias is known, but not well enough."""
-    return any(state == CLUTTER and known for state, known in zip(found.status, np.isfinite(found.bias), strict=True))
 
 
 def _without_textures(scene: Scene) -> Scene:

@@ -314,6 +314,7 @@ def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture,
     asked = []
     monkeypatch.setattr(simulation.measure, "correction", lambda *given: asked.append(given) or len(asked))
     monkeypatch.setattr(simulation, "_completed", lambda *given: given)
+    monkeypatch.setattr(simulation, "_sure", lambda picture, found, *more: found)
     measured = tuple(np.full((2, 2), -float(i)) for i in range(3))
     methods = Method("strip", None), Method("isophote", 0.4)
     how = _Rendered()
@@ -460,6 +461,22 @@ def test_more_rays_are_asked_for_where_a_bias_is_not_known_well_enough(picture, 
     monkeypatch.setattr(simulation.measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
     simulation._until_quiet(picture, Method("gradient"), _Rendered())
     assert len(done) == asked
+
+
+def test_methods_that_are_judged_together_share_the_rays_that_settle_them(picture, monkeypatch):
+    """Both are doubtful at first; the settled images are made once and tell both."""
+    rough, fine, made = SimpleNamespace(name="rough"), SimpleNamespace(name="fine"), []
+    found = {
+        name: _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])})
+        for name, u in (("rough", 9.0), ("fine", 0.1))
+    }
+    monkeypatch.setattr(How, "image", lambda how, picture, seed=0: seed)
+    monkeypatch.setattr(simulation, "_completed", lambda *given: rough)
+    monkeypatch.setattr(simulation, "_settled", lambda *given: made.append(given) or fine)
+    monkeypatch.setattr(simulation.measure, "correction", lambda images, *given: found[images.name])
+    told = simulation.independent(picture, (Method("gradient"), Method("canny")), ("image",), (None, None))
+    assert told == (found["fine"], found["fine"])
+    assert len(made) == 1
 
 
 @pytest.mark.parametrize(("below", "fine"), [(True, 4), (False, 2)])
