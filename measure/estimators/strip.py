@@ -114,7 +114,7 @@ def _misled(layout: Layout, index: int, caliper: Caliper, strip: tuple[np.ndarra
     _, points, along, across = strip
     beyond = [sign * across >= 1 for sign in (1, -1)]
     if not all(some.any() for some in beyond):
-        return False
+        return layout.looks is not None
     plus, minus = (
         Side(sign, int(face), points[some], along[some], across[some], (True, True, True))
         for sign, face, some in zip((1, -1), layout.sides[index], beyond, strict=True)

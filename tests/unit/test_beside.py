@@ -86,6 +86,14 @@ def test_a_shadow_across_a_side_is_clutter_unless_pixels_leave_it_out(name):
     assert (near, beyond) == (status.CLUTTER, status.OK)
 
 
+@pytest.mark.parametrize("name", ["isophote", "strip"])
+def test_what_is_predicted_to_be_clutter_is_no_less_in_a_scene_that_is_not_plain(name):
+    """The classic locators' edge 1 is disturbed; before darkness that says nothing of the others."""
+    known = replace(layout(0.0, 1.0), clutter=np.array([False, True, False, False]))
+    assert [c.status for c in prepared(known, name, 12.0).calipers] == ["ok", "clutter", "ok", "ok"]
+    assert {c.status for c in prepared(replace(known, looks=None), name, 12.0).calipers} == {"ok"}
+
+
 def test_looks_are_moved_with_their_layout(task1):
     """Levels at moved places are those where they were: turned by 2 degrees about the edges' middle and shifted."""
     scene = task1.with_(floor=Floor(reflectance=0.3, height=-2.0))
