@@ -16,6 +16,7 @@ import tempfile
 import threading
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -65,15 +66,12 @@ class Step:
     rows: list[dict[str, Any]] = field(default_factory=list)
 
 
-def _limited() -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS + 1))
-
-
 def run(command: str, *arguments: object) -> tuple[Step, dict[str, Any]]:
     """An ``ice`` command, and the document that it prints; empty where it prints none."""
     line = [sys.executable, "-P", "-m", "validation.cli.main", "-q", command, *map(str, arguments), "--json"]
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
-        process = subprocess.Popen(line, stdout=out, stderr=err, preexec_fn=_limited)
+        process = subprocess.Popen(line, stdout=out, stderr=err)
+        resource.prlimit(process.pid, resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS + 1))
         watch = threading.Timer(PATIENCE * MOST_SECONDS, process.kill)
         watch.start()
         _, status, usage = os.wait4(process.pid, 0)
@@ -161,22 +159,27 @@ def corpus(
     seed: Annotated[int, typer.Option()] = 1,
     until: Annotated[str, typer.Option(help=f"The last command: {', '.join(COMMANDS)}.")] = COMMANDS[-1],
     log: Annotated[Path, typer.Option(help="What is done; begun anew where it is not there.")] = Path("corpus.jsonl"),
+    jobs: Annotated[int, typer.Option(help="Parts at a time.")] = 1,
 ) -> None:
     """Parts from files through new, show, plan, render, measure and validate; resumable."""
     files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KINDS)
     if sample:
         files = [files[k] for k in np.random.default_rng(seed).permutation(len(files))[:sample]]
     known = {row["part"] for row in map(json.loads, log.read_text("utf-8").splitlines())} if log.exists() else set()
-    for number, part in enumerate(files, 1):
-        name = str(part.relative_to(folder))
-        if name in known:
-            continue
-        with tempfile.TemporaryDirectory() as place:
-            rows = [asdict(each) for each in _upto(until, steps(part, Path(place), renders))]
-        with log.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"part": name, "steps": rows}) + "\n")
-        print(f"{number}/{len(files)} {name}: " + "; ".join(map(_line, rows)), flush=True)
+    parts = {str(part.relative_to(folder)): part for part in files}
+    with ThreadPoolExecutor(jobs) as pool:  # of threads: each command is a process of its own
+        names = {pool.submit(_taken, part, until, renders): name for name, part in parts.items() if name not in known}
+        for number, done in enumerate(as_completed(names), 1):
+            name, rows = names[done], done.result()
+            with log.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"part": name, "steps": rows}) + "\n")
+            print(f"{number}/{len(names)} {name}: " + "; ".join(map(_line, rows)), flush=True)
     print(table([json.loads(line) for line in log.read_text("utf-8").splitlines()]))
+
+
+def _taken(part: Path, until: str, renders: int) -> list[dict[str, Any]]:
+    with tempfile.TemporaryDirectory() as place:
+        return [asdict(each) for each in _upto(until, steps(part, Path(place), renders))]
 
 
 def _upto(last: str, made: Iterator[Step]) -> Iterator[Step]:
