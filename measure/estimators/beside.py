@@ -88,7 +88,8 @@ def displacement(
     contrast = float(np.abs(seen[0] - seen[1]).mean())
     error = float(np.sqrt(np.mean(np.abs(told - seen).sum(0) ** 2))) / 2
     noise = float(recorded(layout.optics.sensor, seen).noise_variance.mean())
-    return np.sqrt(2 * np.pi) * width * error / max(contrast, np.finfo(float).tiny), contrast, noise
+    moved = np.sqrt(2 * np.pi) * width * error / contrast if contrast > 0 else np.inf
+    return moved, contrast, noise
 
 
 def _levels(layout: Layout, looks: Looks, caliper: Caliper, side: Side, width: float) -> tuple[np.ndarray, np.ndarray]:
