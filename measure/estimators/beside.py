@@ -72,7 +72,7 @@ def misled(layout: Layout, index: int, caliper: Caliper, sides: tuple[Side, Side
     moved, contrast, noise = displacement(layout, layout.looks, caliper, sides, scale_px)
     blur, length = float(np.mean(caliper.blur(caliper.positions))), float(np.ptp(caliper.positions))
     information = information_bound(np.float64(contrast), noise, blur) * length
-    return not moved <= NEGLIGIBLE / np.sqrt(information)
+    return not (np.isfinite(moved) and moved * np.sqrt(information) <= NEGLIGIBLE)
 
 
 def displacement(

@@ -94,6 +94,13 @@ def test_what_is_predicted_to_be_clutter_is_no_less_in_a_scene_that_is_not_plain
     assert {c.status for c in prepared(replace(known, looks=None), name, 12.0).calipers} == {"ok"}
 
 
+@pytest.mark.parametrize("name", ["isophote", "strip"])
+def test_an_edge_that_the_scene_does_not_show_is_clutter(name):
+    """The same level on both sides: no warning of a division either."""
+    blank = replace(layout(0.0, 1.0), looks=lambda places: np.full(len(places), 40.0))
+    assert {c.status for c in prepared(blank, name, 12.0).calipers} == {"clutter"}
+
+
 def test_looks_are_moved_with_their_layout(task1):
     """Levels at moved places are those where they were: turned by 2 degrees about the edges' middle and shifted."""
     scene = task1.with_(floor=Floor(reflectance=0.3, height=-2.0))
