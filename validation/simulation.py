@@ -7,7 +7,8 @@ rendered so, too, in large images their direct light alone; of plain scenes the 
 lights do. Two renders that are compared have the same rays, one by one, or their difference would be noise; and what
 makes a picture brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
 All of them are made where something is measured (everywhere for estimators that look farther), and with few rays first:
-where the noise of these is far below sigma or the tolerance, more rays would tell nothing.
+where the noise of these is far below sigma or the tolerance, more rays would tell nothing. Where a bias is not known
+well enough for its value to be `ok`, what it depends on is told by more sets of rays, up to a megapixel.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from render.build import MANY_WAYS
 from render.large import LARGE, LARGE_RANDOM, near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
-from scenes.status import MISFIT, OK
+from scenes.status import CLUTTER, MISFIT, OK
 from validation.dimmed import of_one_surface
 from validation.remeasured import Method
 
@@ -44,10 +45,12 @@ _BETWEEN = "interreflection"
 _PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
 _ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
+_SETS = 4  # of rays that tell what changes a bias that is not known well enough
 _NOISY = 8  # pictures in which a texture is looked for
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
-_ALIKE = {"supersample": 2, "samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
+_ALIKE = {"samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
+_FINE, _COARSE = 4, 2  # fine pixels a pixel, each way, of images that are compared, up to a megapixel and above
 
 
 @dataclass(frozen=True)
@@ -69,10 +72,13 @@ class How:
         """With few rays."""
         return replace(self, quality=replace(self.quality, **_FEW))
 
-    @property
-    def compared(self) -> How:
-        """With few rays, the same ones of all pictures from one place: their differences are told, not they."""
-        return replace(self, quality=replace(self.quality, **_ALIKE))
+    def compared(self, picture: Picture) -> How:
+        """With few rays, the same ones of all pictures from one place: their differences are told, not they.
+
+        Beside an edge they have to tell where a shadow ends, which in a coarse grid moves in steps.
+        """
+        fine = _FINE if _is_below(picture, LARGE) else _COARSE
+        return replace(self, quality=replace(self.quality, supersample=fine, **_ALIKE))
 
     @property
     def by_pixel(self) -> bool:
@@ -144,10 +150,23 @@ def independent(
     how = how.by(*methods)
     others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
     images = _completed(picture, others, measured, how)
-    return tuple(
-        measure.correction(images, picture, each.locator, each.threshold, told)
-        for each, told in zip(methods, propagated, strict=True)
-    )
+    settled, found = cache(partial(_settled, picture, images, how)), []
+    for each, told in zip(methods, propagated, strict=True):
+        of = partial(_told_by, picture, each, told)
+        found.append(_sure(picture, of(images), of, settled))
+    return tuple(found)
+
+
+def _told_by(picture: Picture, method: Method, told: PropagatedValues, images: Images) -> Correction:
+    return measure.correction(images, picture, method.locator, method.threshold, told)
+
+
+def _sure(
+    picture: Picture, found: Correction, of: Callable[[Images], Correction], settled: Callable[[], Images]
+) -> Correction:
+    """A correction; where it does not know a bias well enough, up to a megapixel, that of settled images."""
+    doubtful = [state == CLUTTER and known for state, known in zip(found.status, np.isfinite(found.bias), strict=True)]
+    return of(settled()) if any(doubtful) and _is_below(picture, LARGE) else found
 
 
 def of_render(
@@ -204,9 +223,6 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
     Beside it what propagation says of the mean of the first of these renders.
     """
 
-    def of(images: Images, told: PropagatedValues) -> Correction:
-        return measure.correction(images, picture, method.locator, method.threshold, told)
-
     def propagated(renders: tuple[np.ndarray, ...]) -> PropagatedValues:
         clean = np.mean(renders, axis=0)
         return measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
@@ -216,17 +232,34 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
     if how.active(picture) & MANY_WAYS:
         few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
         images, told = _completed(picture, few, (), how), propagated(few)
-        found = of(images, told)
+        of = partial(_told_by, picture, method, told)
+        found = of(images)
         if _is_quiet(found):
-            return found, told
+            return _sure(picture, found, of, partial(_settled, picture, images, how)), told
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
     told = propagated(renders)
-    found = of(images, told)
+    of = partial(_told_by, picture, method, told)
+    found = of(images)
     while len(images.renders) < _MOST and not _is_quiet(found):
         images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
-        found = of(images, told)
-    return found, told
+        found = of(images)
+    return _sure(picture, found, of, partial(_settled, picture, images, how)), told
+
+
+def _settled(picture: Picture, images: Images, how: How) -> Images:
+    """With what is changed as the mean of several sets of rays.
+
+    Rays that are the same in two pictures go the same ways only up to what is changed: where a light stands decides
+    what of bounced light a ray finds, and so much noise is left in their difference, which counts as uncertainty.
+    """
+    seeded = (replace(how, quality=replace(how.quality, seed=how.quality.seed + k)) for k in range(1, _SETS))
+    sets = [images.changed, *(_completed(picture, images.renders, images.beside, each).changed for each in seeded)]
+    changed = {
+        name: tuple(np.mean(same, axis=0) for same in zip(*(each[name] for each in sets), strict=True))
+        for name in images.changed
+    }
+    return replace(images, changed=changed)
 
 
 def _rebased(images: Images, renders: tuple[np.ndarray, ...]) -> Images:
@@ -256,7 +289,7 @@ def _completed(
     how: How,
 ) -> Images:
     """With the images, or numbers, of what the scene is not sure of."""
-    first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared, how.active(picture)
+    first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared(picture), how.active(picture)
     direct, whole, dimmed = cache(partial(alike.direct, active=active)), cache(alike.image), None
     if active & MANY_WAYS == {_BETWEEN} and not _is_below(picture, LARGE):
         dimmed = of_one_surface(picture, renders, partial(direct, picture), _u(picture.scene.uncertainty.reflectance))

@@ -10,11 +10,13 @@ in its response. Through the points of an edge goes the line that the contour of
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from imaging.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
 from imaging.geometry.segments import distance_to_segment
+from measure.estimators.beside import Side, misled
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.separate import PointEstimator, SeparateEstimator, calipers_for, measurable, thinned
@@ -39,10 +41,10 @@ def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[Cros
     offsets, across, _ = places_across(places, normals, optics.window_px)
     sides = [_side(layout, index, caliper, sign) for sign in (1, -1)]
     smoothed = gaussian_rows(across, optics.scale_px, optics.shape)
-    pixels, kernel = reached(-smoothed, *(used for used, *_ in sides))
+    pixels, kernel = reached(-smoothed, *(side.pixels for side in sides))
     level = np.zeros((6, pixels.size))
-    for k, (used, rows, *_) in enumerate(sides):
-        level[3 * k : 3 * k + 3, np.searchsorted(pixels, used)] = rows / 2
+    for k, side in enumerate(sides):
+        level[3 * k : 3 * k + 3, np.searchsorted(pixels, side.pixels)] = side.rows / 2
     blur = caliper.blur(caliper.positions) * np.ones(len(places))
     least = MIN_CONTRAST * np.sqrt(isophote_kappa2(optics.scale_px, blur) / kappa2(optics.scale_px, blur))
     return CrossingLocator(
@@ -52,16 +54,41 @@ def isophote_locator(layout: Layout, index: int, caliper: Caliper) -> tuple[Cros
         kernel=kernel,
         slope_to_contrast=np.sqrt(2 * np.pi) * np.hypot(optics.scale_px, edge_blur(blur)),
         gain=gain * np.ones(len(places)),
-        basis=np.concatenate([basis for _, _, basis, _ in sides], 1),
+        basis=np.concatenate([side.basis for side in sides], 1),
         level=level,
         least_contrast=float(least.mean()),
         optics=optics,
-    ), status.OK if all(clear for *_, clear in sides) else status.CLUTTER
+    ), status.OK if all(side.clear for side in sides) and not _misled(layout, index, caliper, sides) else status.CLUTTER
 
 
-def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """The level on one side of an edge: pixels (P,) and rows (3, P) that take its mean, its change along and across the
-    edge from them, the basis (m, 3) that takes it to the positions, and whether the pixels are clear of all edges."""
+class _Level(NamedTuple):
+    """How one side's level is told: its mean, its change along the edge and across it.
+
+    Attributes
+    ----------
+    pixels : ndarray of int, shape (P,)
+    rows : ndarray, shape (3, P)
+        The level from them.
+    basis : ndarray, shape (m, 3)
+        What each position takes of it.
+    clear : bool
+        Whether the pixels are clear of all edges.
+    side : Side
+    """
+
+    pixels: np.ndarray
+    rows: np.ndarray
+    basis: np.ndarray
+    clear: bool
+    side: Side
+
+
+def _misled(layout: Layout, index: int, caliper: Caliper, levels: list[_Level]) -> bool:
+    return misled(layout, index, caliper, (levels[0].side, levels[1].side), caliper.optics.scale_px)
+
+
+def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> _Level:
+    """The level on one side of an edge."""
     face = int(layout.sides[index, (1 - sign) // 2])
     start = TRIM * edge_blur(layout.optics.blur_px)
     even = face == BACKGROUND or layout.shadings[face] is not None
@@ -77,9 +104,12 @@ def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> tuple[np.n
     own &= clearance >= limit
     lever, away, middle = along[own], sign * across[own], caliper.positions.mean()
     columns = np.stack([np.ones_like(lever), lever - middle, away], 1)
-    told = [True, _extent(lever) > np.ptp(caliper.positions) / 2, not even and _extent(away) > start]
+    told = True, _extent(lever) > np.ptp(caliper.positions) / 2, not even and _extent(away) > start
     rows = np.linalg.pinv(layout.shade(face, points[own])[:, None] * columns * told)
-    return flat[own], rows, _smoothed(layout, face, caliper, sign), bool(limit >= start and own.sum() >= _FEWEST)
+    return _Level(
+        flat[own], rows, _smoothed(layout, face, caliper, sign), bool(limit >= start and own.sum() >= _FEWEST),
+        Side(sign, face, points[own], lever, across[own], told),
+    )  # fmt: skip
 
 
 def _extent(places: np.ndarray) -> float:

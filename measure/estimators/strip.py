@@ -8,6 +8,7 @@ import numpy as np
 
 from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.geometry.segments import distance_to_segment, pixels_along
+from measure.estimators.beside import Side, misled
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
@@ -22,7 +23,9 @@ _MARGIN = 2.0  # px that a lens may make a strip wider in its recording
 HALF_WIDTH = 16.0  # px to each side; wider hardly helps, since the levels are then known well enough
 
 
-def strip_estimator(layout: Layout, caliper: Caliper, index: int, clear: float) -> LikelihoodEstimator | None:
+def strip_estimator(
+    layout: Layout, caliper: Caliper, index: int, strip: tuple[np.ndarray, ...]
+) -> LikelihoodEstimator | None:
     """Estimator of one edge; None if too few pixels are free of other edges.
 
     Grey levels may change linearly along and across the edge on each side, and the blur is free.
@@ -34,11 +37,10 @@ def strip_estimator(layout: Layout, caliper: Caliper, index: int, clear: float) 
         Frame of the edge; its positions tell the part to use.
     index : int
         Which edge of the layout.
-    clear : float
-        How far every other edge must be from a pixel that is used, px.
+    strip : tuple of ndarray
+        Its pixels (flat indices), their ideal coordinates, and those in the caliper (along, across).
     """
-    layout = layout.without_slivers(SLIVER)
-    pixels, ideal, along, across = _strip(layout, caliper, index, clear)
+    pixels, ideal, along, across = strip
     if len(pixels) < 40:
         return None
     middle = caliper.length / 2
@@ -108,16 +110,31 @@ def pixels_beside(caliper: Caliper, half_width: float) -> tuple[np.ndarray, ...]
     return (y * shape[1] + x)[near], points[near], along[near], across[near]
 
 
+def _misled(layout: Layout, index: int, caliper: Caliper, strip: tuple[np.ndarray, ...]) -> bool:
+    _, points, along, across = strip
+    beyond = [sign * across >= 1 for sign in (1, -1)]
+    if not all(some.any() for some in beyond):
+        return layout.looks is not None
+    plus, minus = (
+        Side(sign, int(face), points[some], along[some], across[some], (True, True, True))
+        for sign, face, some in zip((1, -1), layout.sides[index], beyond, strict=True)
+    )
+    return misled(layout, index, caliper, (plus, minus), 0.0)
+
+
 def _prepared(layout: Layout, threshold: float) -> LikelihoodEstimator:
     clear = CLEARANCE * edge_blur(layout.optics.blur_px)  # a face less than twice as wide has no pixel of its own level
-    calipers = edge_calipers(layout, clear, 0.0, 2 * clear)
-    whole = [caliper.status in status.MEASURED for caliper in calipers]
-    parts = [strip_estimator(layout, f, i, clear) if whole[i] else None for i, f in enumerate(calipers)]
-    calipers = tuple(
-        f if part or not can else replace(f, status=status.SHORT)
-        for f, part, can in zip(calipers, parts, whole, strict=True)
-    )
-    return LikelihoodEstimator.joined(calipers, parts)
+    seen, calipers, parts = layout.without_slivers(SLIVER), [], []
+    for index, caliper in enumerate(edge_calipers(layout, clear, 0.0, 2 * clear)):
+        part = None
+        if caliper.status in status.MEASURED:
+            strip = _strip(seen, caliper, index, clear)
+            part = strip_estimator(seen, caliper, index, strip)
+            states = [status.SHORT] * (part is None) + [status.CLUTTER] * _misled(seen, index, caliper, strip)
+            caliper = replace(caliper, status=status.worst(caliper.status, *states))
+        calipers.append(caliper)
+        parts.append(part)
+    return LikelihoodEstimator.joined(tuple(calipers), parts)
 
 
 STRIP = EstimatorKind(_prepared, capture_px=0.125, exact_px=2e-3)

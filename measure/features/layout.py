@@ -17,6 +17,7 @@ from imaging.models.bias import cluttered
 from imaging.models.strong import strong_pieces
 from imaging.pictures import Pictures
 from measure.estimators.shading import Shading, face_shadings
+from measure.features.looks import Looks
 from measure.features.optics import Optics
 from scenes import Edge, Picture, Scene, Solid
 
@@ -51,7 +52,7 @@ class Layout:
     sides : ndarray of int, shape (E, 2)
         Index of the face on the side the normal (-t_y, t_x) points to and on the other; BACKGROUND where there is none.
     shadings : tuple
-        For each of the faces its `Shading`, or None where the light is not known.
+        For each of the faces its `Shading`, or None where the light is not known, or only other faces send it any.
     optics : Optics
     defocus : ndarray, shape (E, 2)
         Signed radius of the circle of confusion at both ends of each edge, px; it changes linearly in between.
@@ -61,6 +62,8 @@ class Layout:
         Where the light is known, for which edges the planner predicts ``clutter`` of the classic locators.
     strong : ndarray, shape (E, 2), optional
         Where the light is known, the piece of each edge that stands out of the noise, as fractions of its length.
+    looks : Looks, optional
+        The levels that the scene shows, where the light is known and things hide or shade each other.
     """
 
     names: tuple[str, ...]
@@ -80,6 +83,7 @@ class Layout:
     arrangement: Arrangement | None = None
     clutter: np.ndarray | None = None
     strong: np.ndarray | None = None
+    looks: Looks | None = None
 
     def moved(self, shift: tuple[float, float], turn: float) -> Layout:
         """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
@@ -97,6 +101,7 @@ class Layout:
             others=move(self.others),
             faces=tuple(move(face) for face in self.faces),
             arrangement=self.arrangement and self.arrangement.moved(shift, turn, middle),
+            looks=self.looks and self.looks.moved(rotation, move(np.zeros(2))),
         )
 
     def shifted(self, offsets: np.ndarray) -> Layout:
@@ -180,7 +185,8 @@ class Layout:
 def layout_of(picture: Picture) -> Layout:
     """The straight edges of a scene's quantities as a sensor pose projects them, in ideal image coordinates.
 
-    With the lights known, the shading of each face is known too, and a face that is not lit is background.
+    With the lights known, the shading of each face is known too, and in a plain scene a face that is not lit is
+    background.
     """
     pictures = Pictures.of(picture)
     return pictures.once("layout", lambda: _layout(picture, pictures))
@@ -195,7 +201,7 @@ def _layout(picture: Picture, pictures: Pictures) -> Layout:
     wanted = picture.lights and names  # beside no edge nobody asks for it
     shadings = face_shadings(pictures) if wanted else [None] * len(solid.faces)
     turned = _boundaries(solid, seen)  # trimmed for whatever the light may be
-    if any(shadings):
+    if any(shadings) and is_plain(scene):  # else other faces may light it, or it is dark before what is bright
         seen = seen & np.array([shading is not None for shading in shadings])
     required = [solid.edge(name) for name in view.names]
     shown = _boundaries(solid, seen)
@@ -223,6 +229,7 @@ def _layout(picture: Picture, pictures: Pictures) -> Layout:
         arrangement=arrangement_of(pictures) if is_plain(scene) else None,
         clutter=cluttered(pictures) if picture.lights else None,
         strong=strong_pieces(pictures, view) if picture.lights else None,
+        looks=Looks.of(pictures) if picture.lights and not is_plain(scene) else None,
     )
 
 

@@ -23,7 +23,7 @@ def test_only_what_is_measured_has_a_value(lead, task1, rng, monkeypatch):
     known = SimpleNamespace(quantities=quantities, value_object=np.array([1.0, 2.0, 3.0]))
     p_value = rng.random(images)
     found = SimpleNamespace(
-        known=known, status=status, image=image, plane=plane, shape=SimpleNamespace(p_value=p_value)
+        known=known, status=status, image=image, plane=plane, shape=SimpleNamespace(p_value=p_value), forms={}
     )
     first = object()
     monkeypatch.setattr(measurands, "of_first", lambda *given: (first, *given))

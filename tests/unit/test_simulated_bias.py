@@ -17,6 +17,7 @@ from measure import Correction, Images
 from measure.correction import _with_pooled
 from render import EffectTolerance, Quality
 from scenes import Picture, Pose
+from scenes.status import allowed
 from tests.oracle import block_image
 from validation import kept, simulation
 from validation.remeasured import Method
@@ -313,6 +314,7 @@ def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture,
     asked = []
     monkeypatch.setattr(simulation.measure, "correction", lambda *given: asked.append(given) or len(asked))
     monkeypatch.setattr(simulation, "_completed", lambda *given: given)
+    monkeypatch.setattr(simulation, "_sure", lambda picture, found, *more: found)
     measured = tuple(np.full((2, 2), -float(i)) for i in range(3))
     methods = Method("strip", None), Method("isophote", 0.4)
     how = _Rendered()
@@ -419,6 +421,70 @@ def test_what_is_compared_is_rendered_once(monkeypatch, below):
     reflected = [levels[0]] if below else [77 - 51]
     assert [each.flat[0] for each in images.changed["reflectance"]] == pytest.approx(reflected, rel=1e-12)
     assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(levels[1:], rel=1e-12)
+
+
+def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
+    """Each of other rays, of the picture as it is and as it is changed the same ones: the mean of what they tell."""
+    scene, seeds = scenes.load("bracket"), []
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+    dark = scene.noise.dark_level
+
+    def rendered(how, shown, effects, seed):
+        seeds.append(how.quality.seed + seed)
+        return np.full((2, 2), dark + (50.0 if shown is picture else 51.0 + (how.quality.seed + seed - 7) ** 2))
+
+    monkeypatch.setattr(How, "_rendered", rendered)
+    how = How(quality=Quality(seed=7))
+    images = simulation._completed(picture, (np.full((2, 2), dark + 100.0),), (), how)
+    settled = simulation._settled(picture, images, how)
+    assert sorted(seeds) == sorted(5 * [7, 8, 9, 10])
+    assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 1, "light_place": 3}
+    for some, first in zip(settled.changed.values(), images.changed.values(), strict=True):
+        for settled_one, first_one in zip(some, first, strict=True):
+            assert first_one == pytest.approx(np.full((2, 2), dark + 102.0), rel=1e-12)
+            assert settled_one == pytest.approx(np.full((2, 2), dark + 102.0 + 2 * (0 + 1 + 4 + 9) / 4), rel=1e-12)
+    assert settled.renders is images.renders
+
+
+@pytest.mark.parametrize(("u", "below", "asked"), [(0.9, True, 0), (1.1, True, 1), (1.1, False, 0)])
+def test_more_rays_are_asked_for_where_a_bias_is_not_known_well_enough(picture, u, below, asked, monkeypatch):
+    """u(bias) a tenth below what is allowed is `ok`, above `clutter` until more rays tell; not above a megapixel."""
+    made, done = _made(picture), []
+    limit = allowed(float(made.sigma[0]))
+    sources = {"rendering": np.array([0.0]), "light_place": np.array([u * limit])}
+    doubtful = dataclasses.replace(made, sources=sources, simulated=("clutter",))
+    monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
+    monkeypatch.setattr(simulation, "LARGE", 1 << 20 if below else 1)
+    monkeypatch.setattr(simulation, "_completed", lambda *given: SimpleNamespace(renders=()))
+    monkeypatch.setattr(simulation, "_settled", lambda *given: done.append(given))
+    monkeypatch.setattr(simulation.measure, "correction", lambda *given: doubtful)
+    monkeypatch.setattr(simulation.measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
+    simulation._until_quiet(picture, Method("gradient"), _Rendered())
+    assert len(done) == asked
+
+
+def test_methods_that_are_judged_together_share_the_rays_that_settle_them(picture, monkeypatch):
+    """Both are doubtful at first; the settled images are made once and tell both."""
+    rough, fine, made = SimpleNamespace(name="rough"), SimpleNamespace(name="fine"), []
+    found = {
+        name: _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])})
+        for name, u in (("rough", 9.0), ("fine", 0.1))
+    }
+    monkeypatch.setattr(How, "image", lambda how, picture, seed=0: seed)
+    monkeypatch.setattr(simulation, "_completed", lambda *given: rough)
+    monkeypatch.setattr(simulation, "_settled", lambda *given: made.append(given) or fine)
+    monkeypatch.setattr(simulation.measure, "correction", lambda images, *given: found[images.name])
+    told = simulation.independent(picture, (Method("gradient"), Method("canny")), ("image",), (None, None))
+    assert told == (found["fine"], found["fine"])
+    assert len(made) == 1
+
+
+@pytest.mark.parametrize(("below", "fine"), [(True, 4), (False, 2)])
+def test_what_is_compared_has_finer_pixels_up_to_a_megapixel(picture, below, fine, monkeypatch):
+    """The edge of a shadow moves in steps of a fine pixel where a light does."""
+    monkeypatch.setattr(simulation, "LARGE", 1 << 20 if below else 1)
+    quality = How(quality=Quality(seed=3)).compared(picture).quality
+    assert (quality.supersample, quality.seed, quality.alike) == (fine, 3, True)
 
 
 def test_what_few_rays_tell_of_all_levels_moves_no_edge():
