@@ -78,8 +78,8 @@ def _tools():
     design, weights = rng.normal(0, 1, (9, 3)), rng.uniform(0.2, 2, 9)
     optics = Optics((50, 70), 0.7, 1.0, 1.2, 3.4)
     valid = np.array([np.ones(9), [1, 1, 0, 0, 0, 0, 0, 0, 0], [1, 0, 1, 1, 0, 1, 1, 1, 0], np.zeros(9)], bool)
-    tool = tools.RimTool(None, design, weights, np.zeros(9), "ok", optics)
-    flat = tools.RimTool(None, design * [1, 1, 0], weights, np.zeros(9), "ok", optics)
+    tool = tools.RimTool(None, design, weights, np.zeros(9), "ok", optics, np.zeros((9, 2)))
+    flat = tools.RimTool(None, design * [1, 1, 0], weights, np.zeros(9), "ok", optics, np.zeros((9, 2)))
     places = np.array([[3.0, 30.0], [60.0, 47.0], [np.nan, 20.0], [30.0, 20.0]])
     return {"fit": tool.fit(valid), "flat": flat.fit(valid[:1]), "held": tools.held(places, optics),
             "small": tools.held(places, replace(optics, shape=(9, 12)))}  # fmt: skip
