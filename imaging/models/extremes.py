@@ -34,8 +34,8 @@ class Law:
     Examples
     --------
     >>> largest = Law.of(np.zeros(2), np.eye(2), lambda x: x.max(-1))
-    >>> print(f"{largest.mean:.3f} {largest.u:.3f} {largest.quantile(0.95):.2f}")  # 1 / sqrt(pi) = 0.564
-    0.564 0.826 1.95
+    >>> print(f"{largest.mean:.3f} {largest.u:.3f} {largest.quantile(0.95):.1f}")  # 1 / sqrt(pi) = 0.564
+    0.564 0.826 2.0
     """
 
     draws: np.ndarray
@@ -142,10 +142,12 @@ def largest_moments(mean: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarra
 
 
 def drawn(covariance: np.ndarray) -> np.ndarray:
-    """Errors of m jointly normal numbers, shape (`DRAWS`, m)."""
+    """Errors of m jointly normal numbers, shape (`DRAWS`, m).
+
+    By the symmetric root of their covariance (m, m): there is one, whichever axes of equal variances a library finds.
+    """
     squares, axes = np.linalg.eigh(covariance)
-    kept = squares > 1e-12 * max(float(squares[-1]), 0.0)
-    return unit_normals(int(kept.sum())) @ (axes[:, kept] * np.sqrt(squares[kept])).T
+    return unit_normals(len(covariance)) @ ((axes * np.sqrt(np.maximum(squares, 0.0))) @ axes.T)
 
 
 @lru_cache(maxsize=64)

@@ -30,7 +30,7 @@ class ExtremeValue:
     --------
     >>> found = ExtremeValue(np.array([10.00, 9.99]), 0.01**2 * np.eye(2), 1)
     >>> print(f"{found.value:.3f} measured; between {found.interval()[0]:.3f} and {found.interval()[1]:.3f} in 95 %")
-    10.000 measured; between 9.989 and 10.021 in 95 %
+    10.000 measured; between 9.986 and 10.020 in 95 %
     """
 
     values: np.ndarray

