@@ -74,6 +74,11 @@ class Inspection:
         """Geometric tolerances that several numbers keep together, each of the picture that tells it best."""
         return tuple(min(each, key=_doubt_of_zone) for each in zip(*(one.zones for one in self.taken), strict=True))
 
+    @property
+    def forms(self) -> dict[str, MeasuredZone]:
+        """The zones of forms, by the names of the rows that they stand for."""
+        return {each.zone.name: each for each in self.zones if each.zone.is_form}
+
     def found(self, row: Inspected) -> measure.Measurements:
         """What was measured in a row's picture."""
         return self.taken[row.picture - 1].found

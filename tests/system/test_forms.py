@@ -18,6 +18,7 @@ from tests import toleranced
 from tests.commands import ice
 from tests.proofs import form
 from validation.inspection import inspect
+from validation.report.inspection_files import About, records
 
 pytestmark = pytest.mark.render
 POSE = (30, 135), (15, 315)
@@ -79,6 +80,11 @@ def test_a_block_quickly(block):
     assert rows["mean"].value == pytest.approx((rows["there"].value + rows["back"].value) / 2)
     assert rows["larger"].value == max(rows["there"].value, rows["back"].value)
     assert made.decision == "pass"
+    lines = records(made, About("", ("picture.png",)))
+    assert [each["characteristic"] for each in lines] == [
+        each["name"] for each in ASKED
+    ]  # a form has one line, its zone's
+    assert [each["lower"] for each in lines if each["characteristic"] in zones] == [0.0, 0.0]
 
 
 def test_what_is_not_known_of_the_camera(block):
@@ -128,7 +134,8 @@ def test_through_all_commands(tmp_path):
     assert {name: each["decision"] for name, each in zones.items()} == dict.fromkeys(("bore", "end", "front"), "pass")
     assert all(0 <= each["low"] <= each["value"] < each["at_most"] < each["high"] for each in zones.values())
     rows = list(csv.DictReader((tmp_path / "out/inspection.csv").read_text().splitlines()))
-    assert [row["characteristic"] for row in rows if row["upper"] == "0.2" and row["lower"] == "0.0"] == ["end"]
+    assert [row["characteristic"] for row in rows if row["lower"] == "0.0"] == ["bore", "end", "front"]
+    assert [row["characteristic"] for row in rows] == [each["name"] for each in asked]
     results = ElementTree.parse(tmp_path / "out/inspection.qif").getroot()
     assert (
         sum(each.text == "PASS" for each in results.iter("{http://qifstandards.org/xsd/qif3}CharacteristicStatusEnum"))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
+from scenes.measurands.kinds import MEASURANDS
 from scenes.status import CLUTTER, is_trusted
 from validation.report import cells
 from validation.strict_json import plain
@@ -83,7 +84,7 @@ def covariance(inspected: Inspection) -> list[list[float | None]]:
 
 
 def table(rows: list[dict[str, Any]], zones: Sequence[dict[str, Any]] = ()) -> Table:
-    """The same for a terminal, each zone in a row below its numbers."""
+    """The same for a terminal, each zone in a row below its numbers, a form's instead of its number."""
     columns = (
         "name", "kind", "value", "u", "unit", "bias off", "u(bias)", "U", "nominal", "tolerance", "decision", "status",
     )  # fmt: skip
@@ -99,14 +100,16 @@ def table(rows: list[dict[str, Any]], zones: Sequence[dict[str, Any]] = ()) -> T
         nominal, zone = f"{row['nominal']:.6g}", row["tolerance"]
         limits = "-" if zone is None else _limits(zone)
         about = row["name"], row["kind"], value, sigma, row["unit"], *off
-        shown.add_row(*about, nominal, limits, _decision(row), row["status"])
+        if not MEASURANDS[row["kind"]].is_form:
+            shown.add_row(*about, nominal, limits, _decision(row), row["status"])
+            off = "-", "-", ""
         if row["name"] in after:
-            shown.add_row(*_zone_cells(after[row["name"]]))
+            shown.add_row(*_zone_cells(after[row["name"]], *off[:2]))
     return shown
 
 
-def _zone_cells(zone: dict[str, Any]) -> tuple[str, ...]:
-    """A zone's row: the size that is needed, and what it is below in 95 %."""
+def _zone_cells(zone: dict[str, Any], bias: str, u_bias: str) -> tuple[str, ...]:
+    """A zone's row: the size that is needed, and what it is below in 95 %; of a form with the bias that is off."""
     if zone["value"] is None:
         value, below = "-", ""
     else:
@@ -114,7 +117,7 @@ def _zone_cells(zone: dict[str, Any]) -> tuple[str, ...]:
         value, below = f"{zone['value']:.{places}f}", f"<= {zone['at_most']:.{places}f}"
     size = "-" if zone["size"] is None else f"{zone['size']:g}"
     return (
-        zone["name"], zone["kind"], value, "", zone["unit"], "-", "-", below, "0", size, zone["decision"] or "-",
+        zone["name"], zone["kind"], value, "", zone["unit"], bias, u_bias, below, "0", size, zone["decision"] or "-",
         zone["status"],
     )  # fmt: skip
 

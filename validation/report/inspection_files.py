@@ -28,9 +28,10 @@ NOTE = (
     "value: as measured in this picture, the bias taken off that a simulation of it tells. U: expanded uncertainty "
     "(95 %) of noise, of the bias' correction and of all else that the scene says is not exactly known. decision (ISO "
     "14253-1): pass where the value keeps both limits by at least U, fail where it is beyond one by more than U; only "
-    "a value whose status is ok is decided. A zone of several numbers (no balloon): the diameter that they need, how "
-    "much larger it may be (95 %), decided by the law of that, which is not normal near 0; under the maximum material "
-    "requirement (ISO 2692) its upper limit is the drawing's with what the measured size adds."
+    "a value whose status is ok is decided. A zone (of several numbers, without a balloon, or of all points of a "
+    "form): the size that they need, how much larger it may be (95 %), decided by the law of that, which is not normal "
+    "near 0; under the maximum material requirement (ISO 2692) its upper limit is the drawing's with what the measured "
+    "size adds."
 )
 
 
@@ -68,9 +69,10 @@ def write(found: Inspection, images: Sequence[np.ndarray], about: About, directo
 def balloons(found: Inspection, number: int, image: np.ndarray):
     """A picture, from 1, with what it tells: each characteristic's features, balloon, value and U, SVG."""
     rows = [row if row.picture == number else None for row in found.rows]
+    forms = found.forms
     requirements = [row and row.requirement for row in rows]
     label = "What was measured: " + "; ".join(f"{each.number} {each.title}" for each in requirements if each)
-    values = [_beside(row) if row else "" for row in rows]
+    values = [_beside(row, forms.get(row.requirement.name)) if row else "" for row in rows]
     picture = found.taken[number - 1].found.picture
     return station_view.draw(picture, requirements, image, label, f"inspection-{number}", values)
 
@@ -97,14 +99,19 @@ def records(found: Inspection, about: About) -> list[dict[str, Any]]:
             "U": each.U, "sigma": finite(each.sigma), "u_bias": finite(u_bias),
             "decision": row.decision, "status": each.status, "reason": each.reason,
         })  # fmt: skip
+    rows = {each["characteristic"]: each for each in told}
     for zone in found.zones:
         facts = zone.facts
-        told.append(dict.fromkeys(told[0]) | {
+        row = {
             "part": about.serial, "characteristic": facts["name"], "kind": facts["kind"], "unit": facts["unit"],
             "nominal": 0.0, "lower": 0.0, "upper": facts["size"], "value": facts["value"],
             "U": facts["at_most"] and facts["at_most"] - facts["value"], "decision": facts["decision"],
             "status": facts["status"],
-        })  # fmt: skip
+        }  # fmt: skip
+        if zone.zone.is_form:
+            rows[facts["name"]].update(row)
+        else:
+            told.append(dict.fromkeys(told[0]) | row)
     return told
 
 
@@ -159,11 +166,17 @@ def _context(found: Inspection, about: About) -> dict[str, Any]:
 
 
 def _lines(found: Inspection) -> list[tuple[Look | None, str, tuple[str, ...]]]:
-    """Of each characteristic its balloon's look, decision and cells; a zone, which has no balloon, below its parts."""
-    lines, several = [], len(found.taken) > 1
+    """Of each characteristic its balloon's look, decision and cells.
+
+    A form's are those of its zone; another zone, which has no balloon, stands below its parts.
+    """
+    lines, several, forms = [], len(found.taken) > 1, found.forms
     for row in found.rows:
-        cells = *_cells(row), *[str(row.picture)] * several
-        lines.append((LOOKS[row.requirement.grade], row.decision or "", cells))
+        look, picture = LOOKS[row.requirement.grade], [str(row.picture)] * several
+        if form := forms.get(row.requirement.name):
+            lines.append((look, form.decision or "", (_cells(row)[0], *_zone_cells(form)[1:], *picture)))
+            continue
+        lines.append((look, row.decision or "", (*_cells(row), *picture)))
         after = (each for each in found.zones if each.zone.parts[-1] == row.requirement.name)
         lines += [(None, each.decision or "", (*_zone_cells(each), *["-"] * several)) for each in after]
     return lines
@@ -218,9 +231,13 @@ def _places(row: Inspected) -> int:
     return decimals(row.requirement.U) if row.requirement.U else 4
 
 
-def _beside(row: Inspected) -> str:
-    """What stands beside a balloon: the value, and below it U, or why there is none."""
+def _beside(row: Inspected, form: MeasuredZone | None = None) -> str:
+    """What stands beside a balloon: the value, and below it U, or of a form what it is below, or why there is none."""
     each, places = row.requirement, _places(row)
+    if form is not None and form.size.is_known and is_trusted(form.status):
+        told = form.facts
+        value, most = (f"{told[name]:.{places}f}" for name in ("value", "at_most"))
+        return f"{cells.united(value, each.unit)}\n≤ {most}"
     if row.value is None or each.U is None or not is_trusted(each.status):
         return each.status if row.value is None else f"{row.value:.{places}f}\n{each.status}"
     return f"{cells.united(f'{row.value:.{places}f}', each.unit)}\n±{each.U:.{places}f}"

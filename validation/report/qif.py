@@ -75,14 +75,13 @@ class _Row:
 def _rows(found: Inspection) -> list[_Row]:
     """Every number, and every zone that several of them keep together; a form's number with its zone's limits."""
     joint = joint_parts(each.zone for each in found.zones)
-    forms = {each.zone.name: each for each in found.zones if each.zone.is_form}
     rows = []
     for row in found.rows:
         told = row.requirement
         kind, zone = MEASURANDS[told.kind], None if told.name in joint else told.tolerance
         of = kind.qif or ("UserDefinedAngular" if kind.is_angle else "UserDefinedLinear")
         limits = None if zone is None else (-zone.minus, zone.plus)
-        decision, form = row.decision, forms.get(told.name)
+        decision, form = row.decision, found.forms.get(told.name)
         if form is not None:
             limits, decision = form.zone.size and (0.0, form.zone.size), form.decision
         rows.append(_Row(of, str(told.number), told.name, told.kind, told.nominal, limits, row.value, row.u, told.U,
