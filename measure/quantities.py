@@ -203,9 +203,11 @@ def _states(known: Measurands, shape: Shape, circles: tuple[Circles, ...], forms
         columns = [shape.counted[:, names.index(name)] for name in quantity.edges if name in names]
         columns += [circles[known.circles.index(name)].state for name in quantity.edges if name in known.circles]
         columns += [_crossing(shape, names, each) for each in quantity.crossings]
-        columns += [forms[each].state for each in (quantity, *quantity.terms) if each in forms]
         if any(name in names for name in quantity.edges):
             columns.append(shape.whole)
+        if quantity in forms:  # an edge that is not straight does not fit a line: that is what is measured
+            columns = [np.where(each == status.MISFIT, status.OK, each) for each in columns]
+            columns.append(forms[quantity].state)
         found[:, m] = [status.worst(*row) for row in zip(*columns, strict=True)]
     return found.astype(str)
 

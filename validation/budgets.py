@@ -16,6 +16,7 @@ from planner.uncertainty.monte_carlo import monte_carlo as drawn_until_stable
 from planner.uncertainty.risks import Limits, global_risks, nonconforming_probability
 from planner.uncertainty.validation import validate
 from scenes import InvalidInput, Picture, Tolerance
+from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.zone import joint_parts
 from scenes.results import picked
 from scenes.status import is_trusted
@@ -135,8 +136,8 @@ def capability(found: SceneBudget, m: int, seed: int = 1) -> dict[str, Any] | No
         "gauge": simulated_gauge(found, m, seed), "guard_band": each.U,
         "specific_risk": nonconforming_probability(each.value, each.u, limits), "global": None, "guarded": None,
     }  # fmt: skip
-    if each.name in joint_parts(found.picture.scene.zones):
-        return facts | {"specific_risk": None}  # conforms or not with the others of its zone
+    if each.name in joint_parts(found.picture.scene.zones) or MEASURANDS[told.kind].extreme:
+        return facts | {"specific_risk": None}  # conforms or not with the others of its zone; or its law is not normal
     spread = found.picture.scene.uncertainty.process_sd
     if not spread or each.unit == "degrees":
         return facts

@@ -71,7 +71,7 @@ class Inspection:
 
     @property
     def zones(self) -> tuple[MeasuredZone, ...]:
-        """Geometric tolerances that several numbers keep together, each of the picture that tells it best."""
+        """Tolerances that several numbers, or all points, keep together, each of the picture that tells it best."""
         return tuple(min(each, key=_doubt_of_zone) for each in zip(*(one.zones for one in self.taken), strict=True))
 
     @property

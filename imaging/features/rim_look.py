@@ -157,7 +157,7 @@ def _levels(pictures: Pictures, circle: Circle, angle, normals, width, where) ->
     spread = 1 + _bend(pictures, circle, angle)[:, None] * width[:, None] * _MIDDLES  # of lines, away from the rim
     beside = (width[:, None] * _BESIDE)[..., None] / np.maximum(spread, _SPREAD)[:, None]
     at = _between(_places(pictures, circle, around), here, normals, beside, circle.ends is None)
-    first, cell = np.floor(at).astype(int), np.arange(_MIDDLES.size)
+    first, cell = np.floor(np.nan_to_num(at)).astype(int), np.arange(_MIDDLES.size)
     share, then = at - first, first + 1
     if circle.ends is not None:
         first, then = (np.clip(each, 0, len(lines) - 1) for each in (first, then))
@@ -183,7 +183,8 @@ def _lines(pictures: Pictures, circle: Circle, angle: np.ndarray, width: np.ndar
     steps = np.diff(_places(pictures, circle, angle), axis=0)
     apart = np.nan_to_num(np.linalg.norm(steps, axis=-1) / width[1:], nan=_APART)
     times = 1 + 2 * int(np.clip(np.ceil((apart.max() / _APART - 1) / 2), 0, _MIDDLE))
-    beyond = 0 if circle.ends is None else int(min(np.ceil(times * _BESIDE[-1] / apart.min()), _MOST_BEYOND))
+    farthest = times * _BESIDE[-1] / (_SPREAD * apart.min())  # towards the middle of a small arc
+    beyond = 0 if circle.ends is None else int(min(np.ceil(farthest), _MOST_BEYOND))
     count = angle.size * times
     around = circle.begin + circle.turn * (np.arange(-beyond, count + beyond) + 0.5) / count
     return around, beyond + times // 2 + times * np.arange(angle.size)
@@ -205,7 +206,7 @@ def _between(rim: np.ndarray, here: np.ndarray, normals: np.ndarray, beside: np.
     else:
         known = length[:-1]
     asked = np.expand_dims(length[here], (1, 2)) + np.expand_dims(ahead, (1, 2)) * beside
-    return np.round(np.interp(np.nan_to_num(asked), known, numbers), _DIGITS)
+    return np.where(np.isnan(asked), np.nan, np.round(np.interp(np.nan_to_num(asked), known, numbers), _DIGITS))
 
 
 def _along_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:

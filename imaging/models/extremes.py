@@ -150,7 +150,7 @@ def drawn(covariance: np.ndarray) -> np.ndarray:
     return unit_normals(len(covariance)) @ ((axes * np.sqrt(np.maximum(squares, 0.0))) @ axes.T)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=4)  # of some hundred numbers 10 MB each
 def unit_normals(count: int) -> np.ndarray:
     """Independent standard normal numbers, shape (`DRAWS`, count)."""
     if count == 0:

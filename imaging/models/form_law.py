@@ -96,7 +96,7 @@ def residues(design: np.ndarray) -> np.ndarray:
     return np.eye(len(design)) - basis @ basis.T
 
 
-def thinned(spacing: float, scale: float) -> int:
+def every(spacing: float, scale: float) -> int:
     """Which places so far apart, px, are points of a form: every so many-th."""
     return max(1, int(SPACING * scale / spacing + 1e-9)) if spacing > 0 else 1
 
@@ -210,7 +210,7 @@ def _of_rim(pictures: Pictures, quantity: Quantity) -> FormLaw | None:
     nearest = np.rint(at).astype(int) % image.arc.size
     arc = image.arc[nearest] * (image.arc.size / count)
     where = np.cumsum(arc) - arc
-    step = thinned(float(arc[used[nearest]].mean()), scale)
+    step = every(float(arc[used[nearest]].mean()), scale)
     pick = np.flatnonzero(used[nearest])[::step]
     apart = np.abs(where[pick, None] - where[pick])
     apart = np.minimum(apart, arc.sum() - apart) if image.turn == 1 else apart

@@ -23,7 +23,7 @@ _PLACES = 9  # along an edge
 _MOST = 600  # pixels of a side that are asked for their levels
 
 
-class Side(NamedTuple):
+class SideLevel(NamedTuple):
     """P pixels that tell the level on one side of an edge, and how.
 
     Attributes
@@ -48,7 +48,7 @@ class Side(NamedTuple):
     terms: tuple[bool, bool, bool]
 
 
-def misled(layout: Layout, index: int, caliper: Caliper, sides: tuple[Side, Side], scale_px: float) -> bool:
+def misled(layout: Layout, index: int, caliper: Caliper, sides: tuple[SideLevel, SideLevel], scale_px: float) -> bool:
     """Whether an edge is found elsewhere than it is, by more than what is negligible beside its noise at best.
 
     Never where the layout does not know what the scene shows; and what disturbs the classic locators disturbs others
@@ -61,7 +61,7 @@ def misled(layout: Layout, index: int, caliper: Caliper, sides: tuple[Side, Side
         Which edge of it.
     caliper : Caliper
         Its positions tell the part that is used.
-    sides : pair of Side
+    sides : pair of SideLevel
     scale_px : float
         Standard deviation of what the image is smoothed with before the edge is found, px; 0 where it is not.
     """
@@ -76,7 +76,7 @@ def misled(layout: Layout, index: int, caliper: Caliper, sides: tuple[Side, Side
 
 
 def displacement(
-    layout: Layout, looks: Looks, caliper: Caliper, sides: tuple[Side, Side], scale_px: float
+    layout: Layout, looks: Looks, caliper: Caliper, sides: tuple[SideLevel, SideLevel], scale_px: float
 ) -> tuple[float, float, float]:
     """How far an edge is found from where it is, at most, px, root mean square along it; contrast and noise's variance.
 
@@ -92,7 +92,9 @@ def displacement(
     return moved, contrast, noise
 
 
-def _levels(layout: Layout, looks: Looks, caliper: Caliper, side: Side, width: float) -> tuple[np.ndarray, np.ndarray]:
+def _levels(
+    layout: Layout, looks: Looks, caliper: Caliper, side: SideLevel, width: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Levels near some places of an edge, as a side's pixels tell them and as the scene has them, grey levels."""
     every = slice(None, None, -(-len(side.points) // _MOST) or 1)
     points, middle = side.points[every], caliper.positions.mean()

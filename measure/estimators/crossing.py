@@ -111,8 +111,8 @@ class CrossingLocator:
         rise = _rise(profiles)
         if self.signs is None:
             return np.where(rise >= 0, 1.0, -1.0)
-        known, near = self.signs[:, None], profiles.shape[1] // 2 - _NEAR
-        other = ((known * rise).sum(0) < 0) & ((known * _rise(profiles[:, near:-near])).sum(0) < 0)
+        known, near = self.signs[:, None], max(profiles.shape[1] // 2 - _NEAR, 0)
+        other = ((known * rise).sum(0) < 0) & ((known * _rise(profiles[:, near : profiles.shape[1] - near])).sum(0) < 0)
         return known * np.where(other, -1.0, 1.0)
 
     def _offsets(self, crossing, start, found, profiles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -329,8 +329,11 @@ def _counted_by(rows: np.ndarray, spread: np.ndarray) -> np.ndarray:
 
 
 def _inside(place: np.ndarray, last: int) -> np.ndarray:
-    """1, falling to 0 from `_FADES` steps before the ends 0 and ``last`` of places where there may be a crossing."""
-    return np.clip(np.minimum(place, last - place) / _FADES, 0.0, 1.0)
+    """1, falling to 0 from `_FADES` steps before the ends 0 and ``last`` of places where there may be a crossing.
+
+    From nearer in a small window, for in its middle nothing counts less.
+    """
+    return np.clip(np.minimum(place, last - place) / min(_FADES, last / 4), 0.0, 1.0)
 
 
 def _first_of_several(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from imaging.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
 from imaging.geometry.segments import distance_to_segment
-from measure.estimators.beside import Side, misled
+from measure.estimators.beside import SideLevel, misled
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.separate import PointEstimator, SeparateEstimator, calipers_for, measurable, thinned
@@ -73,14 +73,14 @@ class _Level(NamedTuple):
         What each position takes of it.
     clear : bool
         Whether the pixels are clear of all edges.
-    side : Side
+    side : SideLevel
     """
 
     pixels: np.ndarray
     rows: np.ndarray
     basis: np.ndarray
     clear: bool
-    side: Side
+    side: SideLevel
 
 
 def _misled(layout: Layout, index: int, caliper: Caliper, levels: list[_Level]) -> bool:
@@ -108,7 +108,7 @@ def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> _Level:
     rows = np.linalg.pinv(layout.shade(face, points[own])[:, None] * columns * told)
     return _Level(
         flat[own], rows, _smoothed(layout, face, caliper, sign), bool(limit >= start and own.sum() >= _FEWEST),
-        Side(sign, face, points[own], lever, across[own], told),
+        SideLevel(sign, face, points[own], lever, across[own], told),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.geometry.segments import distance_to_segment, pixels_along
-from measure.estimators.beside import Side, misled
+from measure.estimators.beside import SideLevel, misled
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
@@ -116,7 +116,7 @@ def _misled(layout: Layout, index: int, caliper: Caliper, strip: tuple[np.ndarra
     if not all(some.any() for some in beyond):
         return layout.looks is not None
     plus, minus = (
-        Side(sign, int(face), points[some], along[some], across[some], (True, True, True))
+        SideLevel(sign, int(face), points[some], along[some], across[some], (True, True, True))
         for sign, face, some in zip((1, -1), layout.sides[index], beyond, strict=True)
     )
     return misled(layout, index, caliper, (plus, minus), 0.0)

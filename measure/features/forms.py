@@ -12,14 +12,14 @@ from functools import lru_cache
 
 import numpy as np
 from scipy import special
+from scipy.ndimage import binary_dilation
 
 from imaging.features.measurand import measurands, normals
-from imaging.models.form_law import CLEAREST, LEAST_CLEAR, FormLaw, residues, thinned
+from imaging.models.form_law import CLEAREST, LEAST_CLEAR, FormLaw, every, form_law, residues
 from imaging.pictures import Pictures
 from measure.estimators.crossing import CrossingLocator
 from measure.estimators.gradient import gradient_locator
-from measure.estimators.separate import calipers_for, measurable
-from measure.estimators.separate import thinned as thinned_caliper
+from measure.estimators.separate import calipers_for, measurable, thinned
 from measure.features.calipers import Caliper
 from measure.features.found import Shape
 from measure.features.layout import Layout, layout_of
@@ -32,6 +32,7 @@ from scenes.measurands.form import Reference, reference_of
 
 _GRID = 0.5  # px to which the place of an edge is rounded where it is looked for, so that images can share it
 _SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
+_CLEAR = 2.0  # times the contrast that a point must have: beside such ones none is lost by noise
 _GAP = 3.0  # times the usual way between places, that a rim without gaps may have
 _NONE = 1e-6  # part of the largest variance of a wave: less is rounding
 _FALSE = 1e-4  # probability that noise alone makes a wave, or a point, of the form of a feature that has none
@@ -154,9 +155,9 @@ def find_form(
         tools = [None if each is None else _of_rim(*each, quantity) for each in near]
     else:
         tools = _edge_tools(picture, quantity, shape)
-    found, states = [], []
+    found, states, expected = [], [], _expected(picture, quantity)
     for image, tool in zip(images, tools, strict=True):
-        one, state = (None, status.NOT_VISIBLE) if tool is None else _measured(image, tool)
+        one, state = (None, status.NOT_VISIBLE) if tool is None else _measured(image, tool, expected)
         found.append(one)
         states.append(state)
     told = [(np.nan, np.nan) if each is None else each.judged(noiseless=noiseless) for each in found]
@@ -164,8 +165,18 @@ def find_form(
     return Forms(size, variance, np.array(states, object).astype(str), tuple(found))
 
 
-def _measured(image: np.ndarray, tool: FormTool) -> tuple[FoundForm | None, str]:
-    """A form in one image, and its status."""
+def _expected(picture: Picture, quantity: Quantity) -> int | None:
+    """How many points the picture should show; None where its light is not known."""
+    law = form_law(Pictures.of(picture), quantity) if picture.lights else None
+    return None if law is None else len(law.covariance)
+
+
+def _measured(image: np.ndarray, tool: FormTool, expected: int | None) -> tuple[FoundForm | None, str]:
+    """A form in one image, and its status.
+
+    Points that are lost beside clear ones, where the scene shows them, are elsewhere than is looked: by more than the
+    search window off. The form is then larger than what is left of it says, so it is a ``misfit``.
+    """
     if tool.state not in status.MEASURED:
         return None, tool.state
     used = image.reshape(1, -1)[:, tool.locator.pixels]
@@ -181,7 +192,16 @@ def _measured(image: np.ndarray, tool: FormTool) -> tuple[FoundForm | None, str]
     at = ((offset + tool.inward) * tool.unit)[valid]
     if tool.reference != "nominal":
         at = residues(tool.design[valid]) @ at
-    return FoundForm(at, law, tool.is_closed and bool(valid.all())), tool.state
+    state = tool.state
+    if (expected is None or valid.sum() < expected) and _is_torn(valid, contrast >= _CLEAR * CLEAREST * np.sqrt(noise)):
+        state = status.worst(state, status.MISFIT)
+    return FoundForm(at, law, tool.is_closed and bool(valid.all())), state
+
+
+def _is_torn(valid: np.ndarray, clear: np.ndarray) -> bool:
+    """Whether points (m,) end where they are clear: beside or one away from a point that is lost."""
+    lost = binary_dilation(~valid, iterations=2)
+    return bool((lost & valid & clear).any())
 
 
 def _smooth(contrast: np.ndarray) -> np.ndarray:
@@ -246,7 +266,7 @@ def _caliper(layout: Layout, name: str, off: tuple[float, float]) -> tuple[Calip
     e, offsets = layout.names.index(name), np.zeros((len(layout.names), 2))
     offsets[e] = off
     each = calipers_for(layout.shifted(offsets) if any(off) else layout, 4)[e]
-    each = thinned_caliper(each, layout.optics.scale_px)
+    each = thinned(each, layout.optics.scale_px)
     share = each.positions / max(each.length, 1e-300)
     return each, off[0] + (off[1] - off[0]) * share
 
@@ -255,7 +275,7 @@ def _of_rim(tool: RimTool, moved: np.ndarray, errors: np.ndarray, quantity: Quan
     """Of a circle or the limb of a ball, from what finds it, the errors (p,) at which that expects it, and those from
     there."""
     spacing = np.linalg.norm(np.diff(tool.places, axis=0), axis=-1) if len(tool.places) > 1 else np.ones(1)
-    pick = np.arange(len(tool.weights))[:: thinned(float(np.median(spacing)), tool.optics.scale_px)]
+    pick = np.arange(len(tool.weights))[:: every(float(np.median(spacing)), tool.optics.scale_px)]
     unit = 1 / tool.design[pick, 2]
     inward = (tool.inward - tool.beside(errors[None])[0] + tool.design @ moved)[pick]
     return FormTool(

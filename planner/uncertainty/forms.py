@@ -7,7 +7,9 @@ Points lie beside their reference by the form and by noise, s + n. For whichever
 - it is at least what the two points need between which the zone of s lies, so that it is smaller than the true one by
   more than k standard deviations of two points' difference with no more than a normal number's probability.
 
-No form has to be assumed for either. The value, from which is taken what noise adds, lies between both.
+No form has to be assumed for either. The value, from which is taken what noise adds, lies between both. What the points
+do not show is in neither: a piece beyond the search window makes the form a ``misfit``; what is narrower than the
+locator's Gaussian, some 4 px, is smoothed.
 """
 
 from __future__ import annotations

@@ -102,15 +102,16 @@ def linked(number: Any, of: tuple[str, ...], minus: tuple[str, ...], known: Mapp
     Raises
     ------
     ValueError
-        If there is none of a name, lengths and angles are mixed, or forms have a largest.
+        If there is none of a name, lengths and angles are mixed, or one has a law of its own.
     """
     for name in of + minus:
         if name not in known:
             listed = ", ".join(known) or "(none)"
             raise ValueError(f"{key}.of must be names of numbers that are listed before it ({listed}), got {name!r}")
     terms = tuple(known[name] for name in of + minus)
-    if MEASURANDS[number.kind].extreme and (forms := [term.name for term in terms if MEASURANDS[term.kind].is_form]):
-        raise ValueError(f"{key}.of must not be forms, each of which has a law of its own, got {', '.join(forms)}")
+    if own := [term.name for term in terms if MEASURANDS[term.kind].is_form or MEASURANDS[term.kind].extreme]:
+        names = ", ".join(own)
+        raise ValueError(f"{key}.of must not be forms, largest or smallest, each of a law of its own, got {names}")
     if len({term.is_angle for term in terms}) > 1:
         raise ValueError(f"{key}.of must be all lengths or all angles, got {', '.join(of + minus)}")
     features = tuple(dict.fromkeys(feature for term in terms for feature in term.features))

@@ -141,7 +141,7 @@ def _apart(known: Faces, each: Characteristic, unit: Unit, both: tuple[list, lis
     rounds = [[surface for surface in some if isinstance(surface, Cylinder)] for some in both]
     wanted, planes = in_unit(each.value, "mm", unit), [s for some in both for s in some if isinstance(s, Plane)]
     if all(rounds):
-        ways = [[*places_of(known, walls), pattern_of(known, walls)] for walls in rounds]
+        ways = [[*places_of(known, walls), *([pattern_of(known, walls)] if len(walls) > 1 else [])] for walls in rounds]
         pairs = [(one, other) for some in ways[0] for one in some for rest in ways[1] for other in rest]
         level = [(one, other) for one, other in pairs if one.is_level(other.at, known.near)]
         near = [pair for pair in level if abs(np.linalg.norm(pair[0].at - pair[1].at) - wanted) <= _AS_DRAWN * wanted]

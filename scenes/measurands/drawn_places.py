@@ -69,7 +69,7 @@ def places_of(known: Faces, walls: Sequence[Cylinder]) -> Iterator[list[Place]]:
 
 
 def pattern_of(known: Faces, walls: Sequence[Cylinder]) -> list[Place]:
-    """What all of some bores and slots say of one place: their own, the middle of two, the centre of a pattern.
+    """What all of some bores say of one place, a slot its own: the middle of two, the centre of a pattern.
 
     At each height at which all of them have a rim; nothing where three or more lie on one line.
     """

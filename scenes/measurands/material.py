@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenes.measurands.features import Centre, Wall
-from scenes.measurands.zone import Material
+from scenes.measurands.zone import MaximumMaterial
 from scenes.parts.solid import Circle, Solid
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _SAME = 1e-6  # of the part's size, and sine of an angle: of one axis
 
 
-def material_of(solid: Solid, key: str, each: Measurand, quantities: Iterable[Quantity]) -> Material:
+def material_of(solid: Solid, key: str, each: Measurand, quantities: Iterable[Quantity]) -> MaximumMaterial:
     """What a measurand's zone grows with.
 
     Parameters
@@ -49,8 +49,8 @@ def material_of(solid: Solid, key: str, each: Measurand, quantities: Iterable[Qu
         raise ValueError(f"{key}.maximum_material must be the size of {own[0].name}, got that of {size.edges[0]}")
     nominal = 2 * float(np.mean([one.radius for one in rounds])) if size.nominal is None else size.nominal
     if isinstance(rounds[0], Circle) and rounds[0].hole:
-        return Material(size.name, nominal - size.tolerance.minus, 1.0)
-    return Material(size.name, nominal + size.tolerance.plus, -1.0)
+        return MaximumMaterial(size.name, nominal - size.tolerance.minus, 1.0)
+    return MaximumMaterial(size.name, nominal + size.tolerance.plus, -1.0)
 
 
 def _round(solid: Solid, feature: Centre | Wall):

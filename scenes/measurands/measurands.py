@@ -146,9 +146,9 @@ class Measurand(Model):
     """What is measured of the features."""
     features: Annotated[tuple[AnyFeature, ...], Field(max_length=64)] = ()
     """Corners, circles and edges, or what lies between some, in the order that the kind asks for; none of a chain."""
-    of: Annotated[tuple[Name, ...], Field(max_length=64)] = ()
+    of: Annotated[tuple[Title, ...], Field(max_length=64)] = ()
     """Of a chain: names of the numbers that it is made of (NAME, or NAME.part), which are listed before it."""
-    minus: Annotated[tuple[Name, ...], Field(max_length=64)] = ()
+    minus: Annotated[tuple[Title, ...], Field(max_length=64)] = ()
     """Of a sum: names of those that are taken off."""
     nominal: Annotated[float, Field(ge=0, le=1e12)] | tuple[Coordinate, Coordinate] | None = None
     """The value that is wanted, the scene's unit or degrees; two for a place; the object's own if left out."""

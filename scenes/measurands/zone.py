@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Material:
+class MaximumMaterial:
     """What a zone grows with (ISO 2692, maximum material requirement).
 
     Attributes
@@ -44,7 +44,7 @@ class Zone:
         Size over that length, or over the number's magnitude: 2 of a zone about a true place.
     size : float or None
         What the drawing allows: diameter or width, the scene's unit; at maximum material, where it grows.
-    material : Material, optional
+    material : MaximumMaterial, optional
         What it grows with.
     is_form : bool
         Whether it is of all points of a feature (`scenes.measurands.form`).
@@ -55,7 +55,7 @@ class Zone:
     parts: tuple[str, ...]
     factor: float
     size: float | None
-    material: Material | None = None
+    material: MaximumMaterial | None = None
     is_form: bool = False
 
     @property

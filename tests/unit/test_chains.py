@@ -26,9 +26,9 @@ CHAINS = [
     {"name": "most", "kind": "largest", "of": ["B", "C", "D"]},
     {"name": "least", "kind": "smallest", "of": ["B", "C", "D"]},
     {"name": "lengths", "kind": "mean", "of": ["slot.length", "slot.width"]},
-    {"name": "twice", "kind": "sum", "of": ["mean", "most"]},
+    {"name": "twice", "kind": "sum", "of": ["mean", "wall"]},
 ]
-VALUES = {"mean": 7.0, "wall": 44.0 - 3.0 - 3.5, "most": 8.0, "least": 6.0, "lengths": 13.0, "twice": 15.0}
+VALUES = {"mean": 7.0, "wall": 44.0 - 3.0 - 3.5, "most": 8.0, "least": 6.0, "lengths": 13.0, "twice": 44.5}
 
 
 def _asked(chains=CHAINS):
@@ -171,14 +171,16 @@ def test_decided_by_the_joint_law():
 @pytest.mark.parametrize(
     ("chain", "message"),
     [
-        ({"kind": "mean", "of": ["B", "E"]}, r"measurands\[7\].of must be names of numbers that are listed before it"),
+        ({"kind": "mean", "of": ["B", "E"]}, r"measurands\[8\].of must be names of numbers that are listed before it"),
         ({"kind": "mean", "of": ["B", "slot"]}, "got 'slot'"),
         ({"kind": "mean", "of": ["B"]}, "of must be at least two different names for kind mean"),
         ({"kind": "sum", "of": ["B"], "minus": ["B"]}, "of must be at least two different names for kind sum"),
         ({"kind": "mean", "of": ["B"], "minus": ["C"]}, "minus must be left out for kind mean, got C"),
         ({"kind": "mean", "of": ["B", "turned"]}, "must be all lengths or all angles"),
         ({"kind": "mean", "of": ["B", "C"], "features": [{"circle": "c2"}]}, "features must be left out"),
-        ({"kind": "largest", "of": ["round", "B"]}, "must not be forms, each of which has a law of its own, got round"),
+        ({"kind": "largest", "of": ["round", "B"]}, "must not be forms, largest or smallest, .* got round"),
+        ({"kind": "mean", "of": ["round", "B"]}, "must not be forms, largest or smallest, .* got round"),
+        ({"kind": "sum", "of": ["B"], "minus": ["most"]}, "must not be forms, largest or smallest, .* got most"),
         ({"kind": "diameter", "features": [{"circle": "c2"}], "of": ["B"]}, "of must be left out for kind diameter"),
         ({"kind": "diameter"}, "features must be a circle or a curved surface for kind diameter, got none"),
     ],
@@ -187,6 +189,7 @@ def test_errors(plate, chain, message):
     others = [
         {"name": "turned", "kind": "angle", "features": [{"edge": "e4"}, {"edge": "e5"}]},
         {"name": "round", "kind": "roundness", "features": [{"circle": "c2"}]},
+        {"name": "most", "kind": "largest", "of": ["B", "C"]},
     ]
     before = _asked([])[:5] + others
     with pytest.raises(InvalidInput, match=message):

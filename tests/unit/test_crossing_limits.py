@@ -111,3 +111,15 @@ def test_an_image_that_is_the_other_way_round_altogether_is_believed():
     assert turned.offset == pytest.approx(0.0, abs=5e-3)
     box = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / (optics.scale_px**2 + optics.blur_px**2)  # none here
     assert turned.contrast == pytest.approx(14.0 * box**1.5, rel=0.02)
+
+
+@pytest.mark.parametrize(("window", "off"), [(1.0, 0.0), (1.0, 0.3), (1.5, 0.6), (3.0, 1.0)])
+def test_a_lone_edge_counts_in_a_small_window(window, off):
+    """Its points are sure of it, in the middle and off it: a window's ends are nearer, and count less from nearer."""
+    optics, rows = Optics((64, 64), blur_px=0.8, window_px=window), np.arange(20.0, 40.0, 2.0)
+    image = np.broadcast_to(90 * ndtr((np.arange(64) - 30.3 - off) / optics.blur_px), optics.shape)
+    places, normals = np.stack([np.full(10, 30.3), rows], -1), np.tile([1.0, 0.0], (10, 1))
+    found = gradient_along(optics, rows, places, normals, signs=-np.ones(10)).locate(image[None])
+    assert found.certain.min() > 0.5
+    turned = gradient_along(optics, rows, places, normals, signs=-np.ones(10)).locate_each(image[None])
+    assert turned.offset == pytest.approx(off, abs=0.02)

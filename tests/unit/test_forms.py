@@ -5,18 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.ndimage import map_coordinates
 
+import measure
 import planner
 import scenes
 from imaging.features.locator import correlation
 from imaging.features.measurand import measurands
-from imaging.models.form_law import FormLaw, form_law, thinned
+from imaging.models.form_law import FormLaw, every, form_law
 from imaging.pictures import Pictures
 from measure.features.forms import FoundForm
+from measure.features.layout import layout_of
 from planner.uncertainty.forms import FormSize
 from scenes import InvalidInput, Picture
 from scenes.measurands.form import forms_of
 from tests import toleranced
+from validation.inspection import inspect
 
 POINTS, SIGMA = 60, 0.01
 STATED = stats.norm.sf(2)
@@ -126,7 +130,7 @@ def test_a_zone_is_not_smaller_than_two_points_say():
 
 
 def test_points_are_far_enough_apart_to_tell_different_things():
-    assert [thinned(spacing, 1.0) for spacing in (0.4, 1.0, 1.9, 3.0, 0.0)] == [5, 2, 1, 1, 1]
+    assert [every(spacing, 1.0) for spacing in (0.4, 1.0, 1.9, 3.0, 0.0)] == [5, 2, 1, 1, 1]
 
 
 @pytest.fixture(scope="module")
@@ -211,3 +215,37 @@ def test_errors(call, message):
 def _asked(kind, feature, **more):
     block = scenes.load("plate")
     return block.with_(measurands=[{"name": "a", "kind": kind, "features": [feature], **more}])
+
+
+@pytest.mark.parametrize(
+    ("piece", "off", "state", "decision"),
+    [
+        (
+            (0.7, 1.2),
+            8.0,
+            "misfit",
+            "undecided",
+        ),  # beyond the search window: what is left is straight
+        ((0.35, 0.65), -5.0, "misfit", "undecided"),
+        ((0.4, 0.6), 1.5, "ok", "fail"),  # within it: that the edge fits no line is what is measured
+        ((0.0, 0.0), 0.0, "ok", "pass"),
+    ],
+)
+def test_a_piece_that_is_elsewhere_is_not_left_out(piece, off, state, decision):
+    """Of an edge in an exact image with noise, a piece is moved across it, px."""
+    block = scenes.load("task1").with_(
+        task=None,
+        measurands=[{"name": "front", "kind": "straightness", "features": [{"edge": "e7"}], "tolerance": 0.1}],
+    )
+    picture = scenes.Picture.of(block, (30, 135), (15, 315))
+    clean, layout = planner.image(picture), layout_of(picture)
+    first, last = layout.ends[layout.names.index("e7")]
+    along = (last - first) / np.linalg.norm(last - first)
+    normal, (y, x) = np.array([-along[1], along[0]]), np.indices(clean.shape)
+    share = ((x - first[0]) * along[0] + (y - first[1]) * along[1]) / np.linalg.norm(last - first)
+    away = np.abs((x - first[0]) * normal[0] + (y - first[1]) * normal[1])
+    moved = np.where((share > piece[0]) & (share < piece[1]) & (away < 25), off, 0.0)
+    image = map_coordinates(clean, [y - moved * normal[1], x - moved * normal[0]], order=1, mode="nearest")
+    image = image + np.random.default_rng(1).normal(0, 2.4, image.shape)
+    (zone,) = inspect(measure.measure(image, picture)).zones
+    assert (zone.status, zone.decision) == (state, decision)

@@ -10,7 +10,7 @@ import scenes
 from planner.uncertainty.material import MaterialSize
 from planner.uncertainty.zones import ZoneSize
 from scenes import InvalidInput
-from scenes.measurands.zone import Material
+from scenes.measurands.zone import MaximumMaterial
 from tests import toleranced
 from validation.zones import MeasuredZone
 
@@ -122,11 +122,11 @@ def plate(tmp_path_factory):
 def test_what_zones_grow_with(plate):
     """The least size of holes; what is decided with it is not decided alone."""
     place, middle = plate.zones
-    assert place.material == Material("bore", 7.95, 1.0)
-    assert middle.material == Material("slot.width", pytest.approx(5.9, abs=1e-6), 1.0)
+    assert place.material == MaximumMaterial("bore", 7.95, 1.0)
+    assert middle.material == MaximumMaterial("slot.width", pytest.approx(5.9, abs=1e-6), 1.0)
     assert (place.numbers, middle.is_joint) == (("place.x", "place.y", "bore"), True)
     assert place.material.departure(8.05) == pytest.approx(0.1)
-    assert Material("shaft", 8.1, -1.0).departure(8.05) == pytest.approx(0.05)
+    assert MaximumMaterial("shaft", 8.1, -1.0).departure(8.05) == pytest.approx(0.05)
 
 
 def test_a_plan_takes_a_feature_in_the_middle_of_its_limits(plate):
@@ -153,7 +153,7 @@ def test_a_shaft_has_most_material_where_it_is_largest():
          "tolerance": 0.1, "maximum_material": "size"},
     ]  # fmt: skip
     (zone,) = shaft.with_(measurands=rows).zones
-    assert zone.material == Material("size", pytest.approx(2 * rim.radius + 0.1), -1.0)
+    assert zone.material == MaximumMaterial("size", pytest.approx(2 * rim.radius + 0.1), -1.0)
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_a_size_without_limits_is_refused(plate):
 def test_a_measured_zone_says_what_it_grew_by():
     """The size that is needed, the size that is allowed, and what is below with 95 %, beside each other."""
     zone = scenes.measurands.zone.Zone(
-        "place", "true_position", ("place.x", "place.y"), 2.0, 0.2, Material("b", 7.9, 1.0)
+        "place", "true_position", ("place.x", "place.y"), 2.0, 0.2, MaximumMaterial("b", 7.9, 1.0)
     )
     told = MeasuredZone(zone, law(0.5), "mm", "ok").facts
     assert (told["value"], told["size"]) == pytest.approx((2 * np.hypot(0.06, 0.03), 0.28))

@@ -48,7 +48,7 @@ def facts(inspected: Inspection) -> list[dict[str, Any]]:
 
 
 def zones(inspected: Inspection) -> list[dict[str, Any]]:
-    """One record a geometric tolerance that several numbers keep together; null for what is not known."""
+    """One record a geometric tolerance that several numbers, or all points, keep together; null for what is unknown."""
     return plain([each.facts for each in inspected.zones])
 
 
@@ -144,8 +144,9 @@ _CAPTION = (
 
 _OF_ZONES = (
     "A geometric tolerance's row is the zone that its numbers need together, and what that is below in 95 %: its law "
-    "is not normal near 0. It is decided by that law, as surely as by 2 u; its numbers alone are not. Under the "
-    "maximum material requirement its tolerance is the drawing's with what the measured size adds, which is in the law."
+    "is not normal near 0. It is decided by that law, a form by bounds, as surely as by 2 u; its numbers alone are "
+    "not. Under the maximum material requirement its tolerance is the drawing's with what the measured size adds, which is "
+    "in the law."
 )
 
 
