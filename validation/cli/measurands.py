@@ -145,8 +145,8 @@ _CAPTION = (
 _OF_ZONES = (
     "A geometric tolerance's row is the zone that its numbers need together, and what that is below in 95 %: its law "
     "is not normal near 0. It is decided by that law, a form by bounds, as surely as by 2 u; its numbers alone are "
-    "not. Under the maximum material requirement its tolerance is the drawing's with what the measured size adds, which "
-    "is in the law."
+    "not. Under the maximum material requirement its tolerance is the drawing's with what the measured size adds, "
+    "which is in the law."
 )
 
 
