@@ -13,6 +13,7 @@ from tests.proofs.corpus import corpus
 from tests.proofs.crowded import crowded
 from tests.proofs.fits import fits
 from tests.proofs.form import form
+from tests.proofs.form_poses import form_poses
 from tests.proofs.hollow import hollow
 from tests.proofs.installed import installed
 from tests.proofs.kill import kill
@@ -41,6 +42,7 @@ app.command()(corpus)
 app.command()(crowded)
 app.command()(fits)
 app.command()(form)
+app.command()(form_poses)
 app.command()(hollow)
 app.command()(installed)
 app.command()(kill)
