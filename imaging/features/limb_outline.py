@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from imaging.contours import OK, Strand, limb
-from imaging.features.locator import reach
+from imaging.features.locator import MOST_PLACES, SPACING, reach
 from imaging.geometry.projection import sensor_position
 from scenes import Camera, Curved, Scene
 from scenes.parts.surfaces import Sphere
@@ -87,6 +87,13 @@ def _joined(pieces: list[list[np.ndarray]], size: int, parameters: int) -> LimbO
     shapes = (3,), (3,), (2,), (2,), (), (), (), (parameters,)
     parts = zip(*pieces, strict=True) if pieces else ((np.empty((0, *shape)),) for shape in shapes)
     return LimbOutline(*(_filled(np.concatenate(part), size) for part in parts))
+
+
+def limb_places(outline: LimbOutline, scale: float) -> int:
+    """How many places along an outline of `LIMB_POINTS` are measured: about `SPACING` smoothing scales (px) apart, a
+    multiple of its own."""
+    length = np.nansum(outline.arc)
+    return LIMB_POINTS * int(np.clip(np.ceil(length / (SPACING * scale * LIMB_POINTS)), 1, MOST_PLACES))
 
 
 def framed(outline: LimbOutline, scene: Scene) -> np.ndarray:

@@ -98,8 +98,9 @@ def look(pictures: Pictures, circle: Circle) -> RimLook:
 def _look(pictures: Pictures, circle: Circle) -> RimLook:
     scene = pictures.scene
     angle = circle.angles(places_around(pictures, circle, _SPACING * scene.locator.scale_px, _MOST))
-    normals, width, where = _outline(pictures, circle, angle)
-    levels = _levels(pictures, circle, angle, normals, width, where)
+    places, normals, width = _normals(pictures, circle, angle)
+    where = outline_beside(pictures, circle, places, normals, width[:, None] * _BESIDE) / width[:, None]
+    levels = _levels(pictures, circle, angle, places, normals, width)
     alone = zero_of_steps(where, _SHARES)
     crossing, slope = _zero(levels, where, alone)
     sides = levels[:, _MIDDLE, [_CELLS - 1, _CELLS]].T
@@ -126,13 +127,6 @@ def _steady(shift: np.ndarray, contrast: np.ndarray) -> np.ndarray:
     return alike & np.roll(alike, 1)
 
 
-def _outline(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Normals (n, 2), the smoothed edge's standard deviation (n,), ideal px, and the outline (n, J) in units of it."""
-    places, normals, width = _normals(pictures, circle, angle)
-    where = outline_beside(pictures, circle, places, normals, width[:, None] * _BESIDE)
-    return normals, width, where / width[:, None]
-
-
 def _normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Image points and normals (n, 2) and the smoothed edge's standard deviation (n,) there, ideal px."""
     scene = pictures.scene
@@ -147,16 +141,17 @@ def _places(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray
     return from_axis(circle.centre + spokes, pictures.sensors, pictures.scene.camera)
 
 
-def _levels(pictures: Pictures, circle: Circle, angle, normals, width, where) -> np.ndarray:
+def _levels(pictures: Pictures, circle: Circle, angle, places, normals, width) -> np.ndarray:
     """Mean signal of the cells (n, J, 2 cells) on both sides of the outline, from the inside outwards.
 
     Lines beside a place along its tangent lie between those of places around the rim, which are looked at once.
     """
-    around, here = _lines(pictures, circle, angle, width)
-    lines = _along_normals(pictures, circle, around)
+    around, here = _lines(circle, angle, places, width)
+    rim = _normals(pictures, circle, around)
+    lines = _along_normals(pictures, *rim)
     spread = 1 + _bend(pictures, circle, angle)[:, None] * width[:, None] * _MIDDLES  # of lines, away from the rim
     beside = (width[:, None] * _BESIDE)[..., None] / np.maximum(spread, _SPREAD)[:, None]
-    at = _between(_places(pictures, circle, around), here, normals, beside, circle.ends is None)
+    at = _between(rim[0], here, normals, beside, circle.ends is None)
     first, cell = np.floor(np.nan_to_num(at)).astype(int), np.arange(_MIDDLES.size)
     share, then = at - first, first + 1
     if circle.ends is not None:
@@ -175,12 +170,12 @@ def _bend(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
     return np.abs(turn) / (2 * step * speed)
 
 
-def _lines(pictures: Pictures, circle: Circle, angle: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _lines(circle: Circle, angle, places: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Angles (m,) of the lines around a rim, beyond an arc's ends too, and which of them are those of its places (n,).
 
     So many for a place that they are near each other, an odd number: one of them goes through it.
     """
-    steps = np.diff(_places(pictures, circle, angle), axis=0)
+    steps = np.diff(places, axis=0)
     apart = np.nan_to_num(np.linalg.norm(steps, axis=-1) / width[1:], nan=_APART)
     times = 1 + 2 * int(np.clip(np.ceil((apart.max() / _APART - 1) / 2), 0, _MIDDLE))
     farthest = times * _BESIDE[-1] / (_SPREAD * apart.min())  # towards the middle of a small arc
@@ -209,13 +204,12 @@ def _between(rim: np.ndarray, here: np.ndarray, normals: np.ndarray, beside: np.
     return np.where(np.isnan(asked), np.nan, np.round(np.interp(np.nan_to_num(asked), known, numbers), _DIGITS))
 
 
-def _along_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
-    """Mean signal of the cells (n, 2 cells) along the normals of places of a rim, from the inside outwards.
+def _along_normals(pictures: Pictures, places: np.ndarray, normals: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Mean signal of the cells (n, 2 cells) along the normals of places (n, 2) of a rim, from the inside outwards.
 
     One ray tells a cell, but several those beside the outline and those that differ from a neighbour: a wall may be
     seen narrower than a cell.
     """
-    places, normals, width = _normals(pictures, circle, angle)
 
     def seen(line: np.ndarray, cells: np.ndarray) -> np.ndarray:
         points = places[line] + (width[line] * cells)[:, None] * normals[line]

@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from imaging.features.circles import LEAST_SEEN, RimImage, rim
-from imaging.features.limb_outline import limb_outline
+from imaging.features.limb_outline import limb_outline, limb_places
 from imaging.features.limbs import limb_rim
 from imaging.features.locator import (
     MIN_CONTRAST,
@@ -66,8 +66,8 @@ class FormLaw:
 
     @property
     def extreme(self) -> Extreme:
-        """The zone that distances (..., m) need: their range, or about the nominal place twice the largest."""
-        return magnitude if self.reference == "nominal" else spread
+        """The zone that distances (..., m) need."""
+        return needed(self.reference)
 
     @cached_property
     def noise(self) -> Law:
@@ -88,6 +88,11 @@ class FormLaw:
         if self.reference == "nominal":
             return 2 * float(np.sqrt(squares.max()))
         return float(np.sqrt(max((squares[:, None] + squares - 2 * self.covariance).max(), 0.0)))
+
+
+def needed(reference: Reference) -> Extreme:
+    """The zone that distances (..., m) need: their range, or about the nominal place twice the largest."""
+    return magnitude if reference == "nominal" else spread
 
 
 def residues(design: np.ndarray) -> np.ndarray:
@@ -228,11 +233,10 @@ def _between(values: np.ndarray, used: np.ndarray, at: np.ndarray) -> np.ndarray
 
 def _places(pictures: Pictures, each: Circle | Curved, image: RimImage) -> int:
     """How many places are measured around a rim."""
-    scale, have = pictures.scene.locator.scale_px, image.arc.size
+    scale = pictures.scene.locator.scale_px
     if isinstance(each, Curved):
-        length = float(np.nansum(limb_outline(each, pictures.sensors, pictures.scene.camera).arc))
-        return have * int(np.clip(np.ceil(length / (SPACING * scale * have)), 1, MOST_PLACES))
-    return have if each.ends is not None else places_around(pictures, each, SPACING * scale, MOST_PLACES)
+        return limb_places(limb_outline(each, pictures.sensors, pictures.scene.camera), scale)
+    return image.arc.size if each.ends is not None else places_around(pictures, each, SPACING * scale, MOST_PLACES)
 
 
 def _rim_errors(pictures: Pictures, image: RimImage) -> tuple[np.ndarray, np.ndarray]:

@@ -10,8 +10,8 @@ import numpy as np
 
 from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
 from imaging.features.limb_look import LimbLook, clear_of_others, limb_look, seen_along
-from imaging.features.limb_outline import LIMB_POINTS, LimbOutline, clear_of_ends, limb_outline
-from imaging.features.locator import MIN_CONTRAST, MOST_PLACES, SPACING, edge_blur
+from imaging.features.limb_outline import LimbOutline, clear_of_ends, limb_outline, limb_places
+from imaging.features.locator import MIN_CONTRAST, edge_blur
 from imaging.geometry.lens import image_centre
 from imaging.pictures import Pictures
 from measure.estimators.gradient import gradient_along
@@ -24,7 +24,8 @@ def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> Ri
     """What measures a curved surface, expected with errors of its three parameters."""
     scene, pictures = picture.scene, Pictures.of(picture)
     optics, curved = Optics.of(scene), nominal.moved(pictures.sensor_at, moved)
-    outline = limb_outline(curved, pictures.sensors, scene.camera, _count(pictures, nominal, optics))
+    count = limb_places(limb_outline(nominal, pictures.sensors, scene.camera), optics.scale_px)
+    outline = limb_outline(curved, pictures.sensors, scene.camera, count)
     seen = limb_look(pictures, curved, outline) if pictures.lights else None
     weight, state = _weights(pictures, curved, outline, seen)
     width = np.hypot(optics.scale_px, edge_blur(optics.blur_px))
@@ -35,12 +36,6 @@ def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> Ri
     places, none = held(crossings + image_centre(scene.camera), optics), np.zeros(len(keep))
     locator = gradient_along(optics, np.arange(float(len(weight)))[keep], places[keep], normals[keep])
     return RimTool(locator, np.nan_to_num(outline.design)[keep], weight[keep], none, state, optics, places[keep])
-
-
-def _count(pictures: Pictures, curved: Curved, optics: Optics) -> int:
-    """Places about `SPACING` smoothing scales apart, a multiple of the planner's."""
-    length = np.nansum(limb_outline(curved, pictures.sensors, pictures.scene.camera).arc)
-    return LIMB_POINTS * int(np.clip(np.ceil(length / (SPACING * optics.scale_px * LIMB_POINTS)), 1, MOST_PLACES))
 
 
 def _weights(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook | None) -> tuple[np.ndarray, str]:

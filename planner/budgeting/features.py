@@ -21,7 +21,7 @@ from imaging.features.rim_sides import outward_normals
 from imaging.geometry.lens import undistorted
 from imaging.geometry.projection import edge_points, project_ideal
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
-from imaging.models.form_law import residues
+from imaging.models.form_law import needed, residues
 from imaging.pictures import Pictures
 from planner.budgeting.station import Station
 from scenes import Curved, Quantity
@@ -119,7 +119,7 @@ class Features:
             off = residues(design) @ off
         if not (len(off) and np.isfinite(off).all()):
             return np.nan
-        size = 2 * np.abs(off).max() if reference_of(quantity) == "nominal" else np.ptp(off)
+        size = needed(reference_of(quantity))(off)
         return float(size * np.sign(off[np.abs(off).argmax()]))
 
     def _beside_edge(self, station: Station, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,8 @@ from measure.correction import RENDERING
 from scenes import Picture, Pose, Scene
 from scenes.status import is_trusted
 from tests import toleranced
-from tests.proofs.kinds import MOST_OFF, pictures
+from tests.proofs.corpus import chance
+from tests.proofs.kinds import is_on_mean, pictures
 from validation import simulation
 from validation.remeasured import Method
 from validation.statistics import sidak
@@ -50,9 +51,7 @@ class Row:
 
     def is_told(self, tests: int) -> bool:
         """Whether all of it lies within chance, of so many tests."""
-        return min(self.p) > sidak(_LEVEL, tests) and abs(self.off) < MOST_OFF + 2 * np.hypot(
-            self.rays, self.count**-0.5
-        )
+        return min(self.p) > sidak(_LEVEL, tests) and is_on_mean(self.off, self.rays, self.count)
 
     def __str__(self) -> str:
         pose, p = "({:.0f}, {:.0f})".format(*self.sensor), ", ".join(f"{each:.3f}" for each in self.p)
@@ -89,8 +88,7 @@ def rows(picture: Picture, images: int, rng: np.random.Generator, seed: int) -> 
             p = _of_form([each for each, is_good in zip(found.forms[name], good, strict=True) if is_good],
                          told.forms[name][0])  # fmt: skip
         else:
-            below = stats.chi2.cdf(value.var(ddof=1) / off.sigma[m] ** 2 * (value.size - 1), value.size - 1)
-            p = (float(2 * min(below, 1 - below)),)
+            p = (chance(value.var(ddof=1) / off.sigma[m] ** 2, value.size),)
         yield Row(picture.sensor, name, off.status[m], value.size, p, (value.mean() - true) / off.sigma[m], rays)
 
 

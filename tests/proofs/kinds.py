@@ -64,7 +64,7 @@ class Row:
     @property
     def is_true(self) -> bool:
         """Whether the mean is the part's value, beyond what rays and the images' number leave."""
-        return abs(self.off) < MOST_OFF + 2 * float(np.hypot(self.rays, self.count**-0.5))
+        return is_on_mean(self.off, self.rays, self.count)
 
     def __str__(self) -> str:
         pose = "({:.0f}, {:.0f})".format(*self.sensor)
@@ -72,6 +72,11 @@ class Row:
             f"{pose:<11}{self.name:<17}{self.status:<14}{self.ok:4.0%} ok  variance {self.ratio:5.3f}, "
             f"mean error {self.off:+.2f} +- {self.rays:.2f} sigma"
         )
+
+
+def is_on_mean(off: float, rays: float, count: int) -> bool:
+    """Whether a mean of so many values is the true one, sigma, beyond what rays and their number leave."""
+    return abs(off) < MOST_OFF + 2 * float(np.hypot(rays, count**-0.5))
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,12 @@ import pytest
 from scipy.optimize import brentq
 
 import scenes
-from imaging.features.limb_outline import limb_outline
+from imaging.features.limb_outline import limb_outline, limb_places
 from imaging.features.limbs import limb_rim
 from imaging.features.measurand import measurands
 from imaging.geometry.projection import sensor_position
 from imaging.pictures import Pictures
 from imaging.pose_scatter import _half_angle
-from measure.features import limbs
 from measure.features.optics import Optics
 from render import Quality
 from scenes import Ball, InvalidInput, Picture, Turned
@@ -182,8 +181,9 @@ def test_places_are_at_most_two_smoothing_scales_apart(larger):
     picture, ball, optics = Picture.of(scene, (40, 30), (30, 200)), scene.solid.round("ball"), Optics.of(scene)
     pictures = Pictures.of(picture)
     length = np.nansum(limb_outline(ball, pictures.sensors, scene.camera).arc)
-    times = limbs._count(pictures, ball, optics) // 64
-    assert times * 64 == limbs._count(pictures, ball, optics)
+    count = limb_places(limb_outline(ball, pictures.sensors, pictures.scene.camera), optics.scale_px)
+    times = count // 64
+    assert times * 64 == count
     assert length / (times * 64) <= 2 * optics.scale_px
     assert times == 1 or length / ((times - 1) * 64) > 2 * optics.scale_px
 
