@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy import special
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, median_filter
 
 from imaging.features.measurand import measurands, normals
 from imaging.models.form_law import CLEAREST, LEAST_CLEAR, FormLaw, every, form_law, residues
@@ -31,7 +31,7 @@ from scenes.measurands.features import place_of
 from scenes.measurands.form import Reference, reference_of
 
 _GRID = 0.5  # px to which the place of an edge is rounded where it is looked for, so that images can share it
-_SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
+_SMOOTH = 5  # places of whose contrasts the median is taken before an error is told from it
 _CLEAR = 2.0  # times the contrast that a point must have: beside such ones none is lost by noise
 _GAP = 3.0  # times the usual way between places, that a rim without gaps may have
 _NONE = 1e-6  # part of the largest variance of a wave: less is rounding
@@ -205,9 +205,8 @@ def _is_torn(valid: np.ndarray, clear: np.ndarray) -> bool:
 
 
 def _smooth(contrast: np.ndarray) -> np.ndarray:
-    """Contrasts (m,) averaged over neighbouring places."""
-    some = np.ones(min(_SMOOTH, contrast.size))
-    return np.convolve(contrast, some, "same") / np.convolve(np.ones(contrast.size), some, "same")
+    """Contrasts (m,), of neighbouring places the median: where a shadow ends at an edge its contrast jumps."""
+    return median_filter(contrast, _SMOOTH, mode="nearest")
 
 
 def _variance(used: np.ndarray, tool: FormTool) -> np.ndarray:
