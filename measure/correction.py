@@ -16,6 +16,7 @@ import numpy as np
 from imaging.features.measurand import measurands
 from imaging.pictures import Pictures
 from imaging.sensor import recorded
+from measure.adjustment import Adjusted, Adjustment, variance
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.propagation import PropagatedValues, propagate
 from measure.quantities import MeasuredFeatures, find
@@ -54,6 +55,9 @@ class Correction:
     saturated : pair of ndarray, shape (M,), or None
         Least and most pixels at the end of the sensor's scale that a picture may have for the bias to be its own
         (`measure.saturation`); any number where nothing is told.
+    adjusted : Adjusted, optional
+        What a picture tells of inputs that the biases depend on. `bias` is that of the scene as it is, `sources` are
+        those of a picture that agrees with it but for these inputs; `of_images` is of pictures that are there.
     """
 
     quantities: tuple[Quantity, ...]
@@ -69,6 +73,7 @@ class Correction:
     renders: int = 1
     beside_renders: int = 1
     saturated: tuple[np.ndarray, np.ndarray] | None = None
+    adjusted: Adjusted | None = None
 
     @property
     def u_bias(self) -> np.ndarray:
@@ -101,6 +106,29 @@ class Correction:
         """Of the values that the noise-free image has, once they are corrected (`scenes.status.corrected`)."""
         return tuple(self.status_of(self.simulated))
 
+    def of_images(self, images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Biases in the object and in the image, and the former's standard uncertainties, each of shape (n, M).
+
+        Parameters
+        ----------
+        images : ndarray, shape (n, height, width)
+            Grey levels, as recorded.
+        """
+        if self.adjusted is None:
+            alike = np.ones((len(images), 1))
+            return alike * self.bias, alike * self.bias_image, alike * self.u_bias
+        others = {name: u for name, u in self.sources.items() if name not in self.adjusted.names}
+        beside, rows = _together(others, self.bias), []
+        for image in images:
+            inputs, covariance = self.adjusted.adjustment.inputs(image)
+            moved = self.adjusted.moved
+            rows.append((
+                self.bias + inputs @ moved, self.bias_image + inputs @ self.adjusted.moved_image,
+                np.sqrt(beside**2 + variance(moved, covariance)),
+            ))  # fmt: skip
+        bias, bias_image, u = (np.array(each).reshape(len(images), -1) for each in zip(*rows, strict=True))
+        return bias, bias_image, np.where(np.isfinite(u), u, np.inf)
+
     def is_of(self, saturated: np.ndarray) -> np.ndarray:
         """Whether the biases are those of pictures (n,) with so many pixels at the end of the scale, bool (n, M)."""
         if self.saturated is None:
@@ -108,13 +136,18 @@ class Correction:
         least, most = self.saturated
         return (saturated[:, None] >= least) & (saturated[:, None] <= most)
 
-    def status_of(self, found: Sequence[str], of: np.ndarray | bool = True) -> list[str]:
-        """The same of values whose statuses as measured are ``found``, (M,), of a picture that the biases are ``of``.
+    def status_of(
+        self, found: Sequence[str], of: np.ndarray | bool = True, u_bias: np.ndarray | None = None
+    ) -> list[str]:
+        """The same of values whose statuses as measured are ``found``, (M,), of a picture that the biases are ``of``,
+        and whose standard uncertainties are ``u_bias``, (M,), if it tells others.
 
         Textures scatter by what `measure.unevenness` tells, and where it does, count in `u_bias` alone.
         """
-        doubts = {name: np.where(np.isfinite(u) & (name == TEXTURE), 0.0, u) for name, u in self.sources.items()}
-        left = np.where(of, _together(doubts, self.bias), np.inf)
+        texture = np.nan_to_num(self.sources.get(TEXTURE, np.zeros(len(self.bias))), posinf=0.0)
+        told = self.u_bias if u_bias is None else u_bias
+        with np.errstate(invalid="ignore"):  # infinite stays so
+            left = np.where(of & np.isfinite(told), np.sqrt(np.maximum(told**2 - texture**2, 0.0)), np.inf)
         told = zip(found, self.simulated, left, self.sigma, self.quantities, strict=True)
         return [
             status_corrected(str(state), simulated, float(u), float(sigma), _half(quantity))
@@ -138,6 +171,9 @@ class Images:
         Standard uncertainties of sources that need no image, in the object and in the image.
     by_pixel : bool
         Whether rays are random pixel by pixel, so that two renders' pixels tell how noisy they are.
+    overall : ndarray, shape (2, 2 + k, height, width), or None
+        Of few rays and all of the picture, as `Adjustment.of` takes them: with the inputs changed of ``changed``, in
+        their order.
     """
 
     renders: tuple[np.ndarray, ...]
@@ -145,6 +181,7 @@ class Images:
     beside: tuple[np.ndarray, ...] = ()
     known: Mapping[str, Pair] = field(default_factory=dict)
     by_pixel: bool = False
+    overall: np.ndarray | None = None
 
 
 def correction(
@@ -178,25 +215,38 @@ def correction(
     clean = np.mean(images.renders, axis=0)  # noise of rays makes weak edges steeper where they cross zero, sigma less
     told = propagated or propagate(clean, picture, estimator=estimator, threshold=threshold).measurands
     steps = [(name, image) for name, some in images.changed.items() for image in some]
-    levels = _levels((*images.renders, *images.beside, *(image for _, image in steps)), picture)
-    value, value_image, found = _measured(levels, picture, estimator, threshold)
+    levels = _levels((*images.renders, *images.beside, *(image for _, image in steps), clean), picture)
+    *values, found = _measured(levels, picture, estimator, threshold)
     renders, alike = len(images.renders), len(images.renders) + len(images.beside)
     known = measurands(Pictures.of(picture))
-    bias, bias_image = value[:renders].mean(0) - known.value_object, value_image[:renders].mean(0) - known.value
-    noise = _noise(images, picture, told, levels[:alike], found, (value[:alike], value_image[:alike]))
+    bias, bias_image = (
+        _without_noise(each[:renders], each[-1], found.on_forms) - true
+        for each, true in zip(values, (known.value_object, known.value), strict=True)
+    )
+    noise = _noise(images, picture, told, levels[:alike], found, tuple(each[:alike] for each in values))
+    names, moved = tuple(name for name, _ in steps), [each[alike:-1] - each[0] for each in values]
+    adjusted = _adjusted(images, picture, names, moved)
     object_, image = (
         {
             RENDERING: noise[k] / np.sqrt(renders),
-            **_by_steps([name for name, _ in steps], each[alike:] - each[0]),
+            **(adjusted.sources(moved[k]) if adjusted else _by_steps(names, moved[k])),
             **{name: pair[k] for name, pair in images.known.items()},
         }
-        for k, each in enumerate((value, value_image))
+        for k in range(2)
     )
     return Correction(
         picture.scene.quantities, estimator, threshold, bias, bias_image, object_, image,
         told.covariance, told.covariance_image, told.status, renders, max(len(images.beside), 1),
-        limits(images.renders[0], picture, estimator, threshold, np.sqrt(np.diag(told.covariance))),
+        limits(images.renders[0], picture, estimator, threshold, np.sqrt(np.diag(told.covariance))), adjusted,
     )  # fmt: skip
+
+
+def _adjusted(images: Images, picture: Picture, names: tuple[str, ...], moved: list[np.ndarray]) -> Adjusted | None:
+    """None where nothing depends on inputs, or no images tell of them."""
+    if images.overall is None or not names:
+        return None
+    adjustment = Adjustment.of(images.overall, picture)
+    return None if adjustment is None else Adjusted(adjustment, names, *moved)
 
 
 def _levels(images: Sequence[np.ndarray], picture: Picture) -> np.ndarray:
@@ -213,6 +263,18 @@ def _measured(
     found = find(levels, picture, estimator, threshold, noiseless=True)
     measured = np.isin(found.status, MEASURED)
     return np.where(measured, found.plane.value, np.nan), np.where(measured, found.image.value, np.nan), found
+
+
+def _without_noise(values: np.ndarray, of_mean: np.ndarray, on_forms: np.ndarray) -> np.ndarray:
+    """Mean (M,) of values (n, M) in renders, ``of_mean`` (M,) in the renders' mean.
+
+    A form is an extreme, which the renders' noise makes larger by its square: less so in their mean by 1 / n, and so
+    it is taken off by the jackknife (Quenouille, Biometrika 43, 1956).
+    """
+    mean, count = values.mean(0), len(values)
+    if count > 1:
+        mean[on_forms] = (count * of_mean - mean)[on_forms] / (count - 1)
+    return mean
 
 
 def _noise(
@@ -234,6 +296,8 @@ def _noise(
     if images.by_pixel and told.response is not None and told.response_image is not None:
         blur, responses = picture.scene.camera.blur_px, (told.response, told.response_image)
         first, second = (by_pixels(levels, response, blur) for response in responses)
+        for deviations, each in zip((first, second), values, strict=True):
+            deviations[found.on_forms] = each.std(0, ddof=1)[found.on_forms]  # no pixel alone moves a form
         return _where_known(first, spreads[0]), _where_known(second, spreads[1])
     part = by_features(found, count)
     first, second = (
@@ -263,7 +327,7 @@ def _where_known(deviations: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(np.diag(covariance)), deviations, np.inf)
 
 
-def _by_steps(names: list[str], moved: np.ndarray) -> dict[str, np.ndarray]:
+def _by_steps(names: Sequence[str], moved: np.ndarray) -> dict[str, np.ndarray]:
     """By source, the root sum square of what its inputs' steps move the values by, (k, M)."""
     return {name: np.sqrt((moved[[n == name for n in names]] ** 2).sum(0)) for name in dict.fromkeys(names)}
 

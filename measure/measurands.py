@@ -47,7 +47,7 @@ class Measurements(Shown):
         What the images are taken to show: scene, sensor, and the lights where they are known.
     saturated : ndarray of int, shape (...)
         How many of the pixels looked at are at the end of the sensor's scale.
-    bias, u_bias : ndarray, shapes (M,) and (..., M)
+    bias, u_bias : ndarray, shape (..., M)
         What a `Correction` has taken off the values, and its standard uncertainty (not variance), `units`; 0 and NaN
         where none was made; infinite where more pixels are saturated, or fewer, than those of which it tells. Where
         one was, the variances of what was ``clutter`` or ``misfit`` are those propagated in the simulated picture, for
@@ -158,7 +158,7 @@ def measure(
     if correction is not None:
         _check_same(correction, picture, estimator, threshold)
         (found,) = measure_by(image, picture, ((correction.estimator, correction.threshold),))
-        return corrected(found, correction)
+        return corrected(found, correction, image)
     (found,) = measure_by(image, picture, ((estimator or best_estimator(picture.scene), threshold),))
     return found
 
@@ -174,12 +174,15 @@ def _check_same(correction: Correction, picture: Picture, estimator: str | None,
             raise InvalidInput(f"{name} must be that of the correction, {its}, got {given}")
 
 
-def corrected(found: Measurements, correction: Correction) -> Measurements:
-    """With the biases of a picture taken off, and the statuses that this leaves."""
+def corrected(found: Measurements, correction: Correction, image: np.ndarray) -> Measurements:
+    """With the biases of a picture taken off that was found in ``image``, (..., height, width), and the statuses that
+    this leaves."""
     shape = found.status.shape
+    off, off_image, u_bias = correction.of_images(image.reshape(-1, *image.shape[-2:]))
     of = correction.is_of(found.saturated.ravel())
-    rows = [correction.status_of(*each) for each in zip(found.status.reshape(-1, shape[-1]), of, strict=True)]
-    off, off_image = (np.nan_to_num(each) for each in (correction.bias, correction.bias_image))
+    told = zip(found.status.reshape(-1, shape[-1]), of, u_bias, strict=True)
+    states = np.array([correction.status_of(*each) for each in told]).reshape(shape)
+    off, off_image = (np.nan_to_num(each).reshape(shape) for each in (off, off_image))
     doubtful = np.isin(found.status, (status.CLUTTER, status.MISFIT))
     return replace(
         found,
@@ -187,14 +190,14 @@ def corrected(found: Measurements, correction: Correction) -> Measurements:
         value_image=found.value_image - off_image,
         covariance=_scaled(found.covariance, correction.covariance, doubtful),
         covariance_image=_scaled(found.covariance_image, correction.covariance_image, doubtful),
-        status=np.array(rows).reshape(shape),
-        first=found.first and _first_corrected(found.first, off_image[0], np.array(rows)[:, 0].reshape(shape[:-1])),
+        status=states,
+        first=found.first and _first_corrected(found.first, off_image[..., 0], states[..., 0]),
         bias=off,
-        u_bias=np.where(of, correction.u_bias, np.inf).reshape(shape),
+        u_bias=np.where(of, u_bias, np.inf).reshape(shape),
     )
 
 
-def _first_corrected(first: Measurement, bias: float, states: np.ndarray) -> Measurement:
+def _first_corrected(first: Measurement, bias: np.ndarray, states: np.ndarray) -> Measurement:
     measured = np.isfinite(first.value_px)
     return replace(
         first, value_px=first.value_px - bias, bias_px=np.where(measured, bias, 0.0), status=states
@@ -244,7 +247,7 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         first=of_first(found, picture, lead) if quantities[0].kind == "distance" else None,
         picture=picture,
         saturated=saturation.reshape(lead),
-        bias=np.zeros(count),
+        bias=np.zeros((*lead, count)),
         u_bias=np.full((*lead, count), np.nan),
         forms={quantity.name: form.found for quantity, form in found.forms.items()},
     )

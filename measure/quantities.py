@@ -75,6 +75,11 @@ class MeasuredFeatures:
         """Of the straight edges."""
         return self.known.view.names
 
+    @property
+    def on_forms(self) -> np.ndarray:
+        """Which quantities, bool (M,), depend on the size of a form."""
+        return (self.plane.gradient[..., self.seen.of_forms] != 0).any((0, 2))
+
     def with_errors(self, errors: np.ndarray) -> MeasuredFeatures:
         """The same of one image with another covariance (q, q) of its lines and circles."""
         return replace(self, errors=errors[None])

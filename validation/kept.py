@@ -15,7 +15,7 @@ import os
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -25,6 +25,7 @@ import measure
 import render
 import scenes
 from measure import Correction
+from measure.adjustment import Adjusted, Adjustment
 from render import variant as variants
 from scenes import ImageTexture, Picture
 from scenes.status import ALL
@@ -35,6 +36,46 @@ from validation.simulation import How
 
 _LARGEST = 1 << 24  # bytes of a file
 _Numbers = list[float | None]
+
+
+class _Adjusted(BaseModel):
+    """A `measure.adjustment.Adjusted` of k inputs by n blocks; null is NaN."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    side: Annotated[int, Field(ge=1, le=1 << 20)]
+    at: list[tuple[int, int]]
+    columns: list[list[float]]
+    region: list[int]
+    variance: list[Annotated[float, Field(gt=0)]]
+    normal: list[list[float]]
+    dark: float
+    names: list[Annotated[str, Field(max_length=40)]]
+    moved: list[_Numbers]
+    moved_image: list[_Numbers]
+
+    def made(self, count: int) -> Adjusted | None:
+        """Of so many values; None where it is not as it was written."""
+        n, k = len(self.at), len(self.names)
+        values = *self.moved, *self.moved_image
+        whole = len(self.columns) == len(self.region) == len(self.variance) == n
+        whole &= len(self.normal) == len(self.moved) == len(self.moved_image) == k
+        whole &= all(len(row) == k + 1 for row in self.columns) and all(len(row) == k for row in self.normal)
+        whole &= all(len(row) == count for row in values)
+        if not whole:
+            return None
+        columns, variance, normal = (np.array(each, float) for each in (self.columns, self.variance, self.normal))
+        adjustment = Adjustment(
+            self.side, np.array(self.at, int), columns, np.array(self.region, int), variance, normal, self.dark
+        )
+        moved = (np.array([_array(row) for row in each]) for each in (self.moved, self.moved_image))
+        return Adjusted(adjustment, tuple(self.names), *moved)
+
+    @staticmethod
+    def facts(found: Adjusted) -> dict[str, Any]:
+        """What is written of it."""
+        own = {key: getattr(found, key) for key in ("names", "moved", "moved_image")}
+        return {**vars(found.adjustment), **own}
 
 
 class _Kept(BaseModel):
@@ -52,6 +93,7 @@ class _Kept(BaseModel):
     renders: Annotated[int, Field(ge=1, le=1000)]
     saturated: tuple[_Numbers, _Numbers] | None
     """Least and most; null where there is no most."""
+    adjusted: _Adjusted | None
 
 
 def correction(picture: Picture, method: Method, how: How = How()) -> Correction:
@@ -111,11 +153,12 @@ def _read(file: Path, picture: Picture, method: Method) -> Correction | None:
         {name: _array(some, np.inf) for name, some in kept.sources_image.items()},
         *(_square(rows) for rows in (kept.covariance, kept.covariance_image)), tuple(kept.simulated), kept.renders,
         saturated=kept.saturated and tuple(_array(limit, np.inf) for limit in kept.saturated),
+        adjusted=kept.adjusted and kept.adjusted.made(count),
     )  # fmt: skip
     vectors = (
         found.bias, found.bias_image, *found.sources.values(), *found.sources_image.values(), *(found.saturated or ()),
     )  # fmt: skip
-    whole = all(each.shape == (count,) for each in vectors)
+    whole = all(each.shape == (count,) for each in vectors) and (kept.adjusted is None) == (found.adjusted is None)
     whole &= all(each.shape == (count, count) for each in (found.covariance, found.covariance_image))
     return found if whole and len(found.simulated) == count and set(found.simulated) <= ALL else None
 
@@ -139,6 +182,7 @@ def _write(file: Path, found: Correction) -> None:
         "sources_image": found.sources_image, "covariance": found.covariance,
         "covariance_image": found.covariance_image, "simulated": list(found.simulated), "renders": found.renders,
         "saturated": found.saturated and list(found.saturated),
+        "adjusted": found.adjusted and _Adjusted.facts(found.adjusted),
     }  # fmt: skip
     part = file.with_suffix(f".{os.getpid()}")
     with suppress(OSError):
@@ -151,8 +195,9 @@ def _plain(value):
     """Lists of numbers; null for what is not finite."""
     if isinstance(value, dict):
         return {name: _plain(inner) for name, inner in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return [_plain(inner) for inner in value]
     if isinstance(value, np.ndarray):
-        return [_plain(inner) if inner.ndim else (float(inner) if np.isfinite(inner) else None) for inner in value]
+        finite = value if value.dtype.kind == "i" else np.where(np.isfinite(value), value.astype(object), None)
+        return finite.tolist()
     return value

@@ -8,7 +8,8 @@ lights do. Two renders that are compared have the same rays, one by one, or thei
 makes a picture brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
 All of them are made where something is measured (everywhere for estimators that look farther), and with few rays first:
 where the noise of these is far below sigma or the tolerance, more rays would tell nothing. Where a bias is not known
-well enough for its value to be `ok`, what it depends on is told by more sets of rays, up to a megapixel.
+well enough for its value to be `ok`, up to a megapixel, all of the picture is rendered with few rays, for it tells of
+reflectances and lights itself (`measure.adjustment`); and where that does not do, more sets of rays.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ _NOISY = 8  # pictures in which a texture is looked for
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
 _ALIKE = {"samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
+_OVERALL = {"supersample": 1, "samples": 1, "edge_samples": 4, "random_samples": 16}
 _FINE, _COARSE = 4, 2  # fine pixels a pixel, each way, of images that are compared, up to a megapixel and above
 
 
@@ -150,10 +152,10 @@ def independent(
     how = how.by(*methods)
     others = tuple(how.image(picture, 1 + i) for i in range(len(measured)))
     images = _completed(picture, others, measured, how)
-    settled, found = cache(partial(_settled, picture, images, how)), []
+    more, found = [cache(each) for each in _more(picture, images, how)], []
     for each, told in zip(methods, propagated, strict=True):
         of = partial(_told_by, picture, each, told)
-        found.append(_sure(picture, of(images), of, settled))
+        found.append(_sure(picture, of(images), of, more))
     return tuple(found)
 
 
@@ -162,11 +164,33 @@ def _told_by(picture: Picture, method: Method, told: PropagatedValues, images: I
 
 
 def _sure(
-    picture: Picture, found: Correction, of: Callable[[Images], Correction], settled: Callable[[], Images]
+    picture: Picture, found: Correction, of: Callable[[Images], Correction], more: Iterable[Callable[[], Images]]
 ) -> Correction:
-    """A correction; where it does not know a bias well enough, up to a megapixel, that of settled images."""
-    doubtful = [state == CLUTTER and known for state, known in zip(found.status, np.isfinite(found.bias), strict=True)]
-    return of(settled()) if any(doubtful) and _is_below(picture, LARGE) else found
+    """A correction; where it does not know a bias well enough, up to a megapixel, that of more images."""
+    for images in more if _is_below(picture, LARGE) else ():
+        states = zip(found.status, np.isfinite(found.bias), strict=True)
+        if not any(state == CLUTTER and known for state, known in states):
+            break
+        found = of(images())
+    return found
+
+
+def _more(picture: Picture, images: Images, how: How) -> list[Callable[[], Images]]:
+    """What tells of inputs that these images do not know well enough, the quickest first."""
+    overall = cache(partial(_overall, picture, how))
+    return [
+        lambda: replace(images, overall=overall()),
+        lambda: replace(_settled(picture, images, how), overall=overall()),
+    ]
+
+
+def _overall(picture: Picture, how: How) -> np.ndarray:
+    """Images of all of a picture, as `measure.Images` has them."""
+    how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
+    for seed in range(2):
+        alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
+        sets.append([how.image(picture, seed), *map(alike.image, (picture, *_changed_pictures(picture)))])
+    return np.array(sets)
 
 
 def of_render(
@@ -235,7 +259,7 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
         of = partial(_told_by, picture, method, told)
         found = of(images)
         if _is_quiet(found):
-            return _sure(picture, found, of, partial(_settled, picture, images, how)), told
+            return _sure(picture, found, of, _more(picture, images, how)), told
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = _rebased(images, renders) if images else _completed(picture, renders, (), how)
     told = propagated(renders)
@@ -244,7 +268,7 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
     while len(images.renders) < _MOST and not _is_quiet(found):
         images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
         found = of(images)
-    return _sure(picture, found, of, partial(_settled, picture, images, how)), told
+    return _sure(picture, found, of, _more(picture, images, how)), told
 
 
 def _settled(picture: Picture, images: Images, how: How) -> Images:
@@ -303,6 +327,13 @@ def _completed(
         made = whole if _is_below(picture, LARGE) else direct
         changed[LIGHT] = _steps(first, made, _with_lights_moved(picture), picture)
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
+
+
+def _changed_pictures(picture: Picture) -> Iterator[Picture]:
+    """With each input changed, in the order of `_completed`'s images."""
+    yield from _of_other_surfaces(picture)
+    if not is_plain(picture.scene):
+        yield from _with_lights_moved(picture)
 
 
 def _is_below(picture: Picture, pixels: int) -> bool:

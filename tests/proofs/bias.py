@@ -92,7 +92,8 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
     """Of a picture, its reflectances and lights drawn anew in each trial."""
     scene, rng = picture.scene, np.random.default_rng(seed)
     method = Method(estimator or measure.best_estimator(scene))
-    off, everywhere = simulation.simulated(picture, method), not measure.ESTIMATORS[method.locator].local
+    off = simulation.simulated(picture, method)
+    everywhere = off.adjusted is not None or not measure.ESTIMATORS[method.locator].local
     true, left, noisy = _true(picture, off), [], []
     for trial in range(trials):
         actual = Picture(deviating(scene, rng), picture.sensor, tuple(moved(pose, rng) for pose in picture.lights))
@@ -100,16 +101,17 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
         exposed = render.expose(clean, scene.noise, rng, images)
         found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
         away = np.where(is_trusted(found.status), found.value - true, np.nan)
-        left.append(away[0] / np.hypot(_by_inputs(off), off.beside))
-        noisy += list(away[1:] / np.sqrt(off.sigma**2 + _by_inputs(off) ** 2 + off.beside**2))
+        beside = np.hypot(_by_inputs(found.u_bias, off), off.beside)
+        left.append(away[0] / beside[0])
+        noisy += list(away[1:] / np.hypot(off.sigma, beside[1:]))
     names = tuple(quantity.name for quantity in scene.quantities)
     return Pulls(scene.name, names, off.status, off.bias / off.sigma, np.array(left), np.array(noisy))
 
 
-def _by_inputs(off: measure.Correction) -> np.ndarray:
-    """Standard uncertainties (M,) of the biases by all but the renderer's noise: `beside` has that."""
+def _by_inputs(u_bias: np.ndarray, off: measure.Correction) -> np.ndarray:
+    """Standard uncertainties (n, M) of biases by all but the renderer's noise: `beside` has that."""
     with np.errstate(invalid="ignore"):  # infinite where a value is not measured
-        return np.sqrt(np.maximum(off.u_bias**2 - off.sources[RENDERING] ** 2, 0.0))
+        return np.sqrt(np.maximum(u_bias**2 - off.sources[RENDERING] ** 2, 0.0))
 
 
 def _true(picture: Picture, off: measure.Correction) -> np.ndarray:

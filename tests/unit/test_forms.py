@@ -249,3 +249,38 @@ def test_a_piece_that_is_elsewhere_is_not_left_out(piece, off, state, decision):
     image = image + np.random.default_rng(1).normal(0, 2.4, image.shape)
     (zone,) = inspect(measure.measure(image, picture)).zones
     assert (zone.status, zone.decision) == (state, decision)
+
+
+def test_errors_where_a_shadow_ends(block):
+    """Points beside a jump of the contrast along an edge scatter as told: neither side tells the other's noise."""
+    picture = Picture.of(block.with_(noise={"sigma": 1.0}), *POSE)
+    clean, layout = planner.image(picture), layout_of(picture)
+    first, last = layout.ends[layout.names.index("e7")]
+    along = (last - first) / np.linalg.norm(last - first)
+    share = np.tensordot(along, np.indices(clean.shape)[::-1] - first[:, None, None], 1) / np.linalg.norm(last - first)
+    dark = block.noise.dark_level
+    shaded = dark + (clean - dark) * np.where(share > 0.5, 0.15, 1.0)
+    noisy = shaded + np.random.default_rng(3).normal(size=(400, *clean.shape))
+    found = measure.measure(noisy, picture).forms["front"]
+    told = np.sqrt(np.diag(found[0].law.covariance))
+    assert told.max() > 4 * told.min()
+    ratio = np.std([each.points for each in found], axis=0) / told
+    assert np.abs(ratio - 1).max() < 0.35  # 0.04 by chance; averaged contrasts are 0.9 off
+
+
+def test_a_renders_noise_is_no_form(block):
+    """What rays add to a form in each noise-free image is not taken for bias, and how far it is not known is told."""
+    picture, rng = Picture.of(block, *POSE), np.random.default_rng(4)
+    clean = planner.image(picture)
+    exact = measure.correction(measure.Images((clean,)), picture).bias[0]
+    told = [
+        measure.correction(measure.Images(tuple(clean + rng.normal(0, 1.0, (3, *clean.shape))), by_pixel=True), picture)
+        for _ in range(24)
+    ]
+    bias = np.array([each.bias[0] for each in told])
+    assert abs(bias.mean() - exact) < 4 * bias.std(ddof=1) / len(told) ** 0.5
+    u = np.sqrt(np.mean([each.sources["rendering"][0] ** 2 for each in told]))
+    assert 0.5 < u / bias.std(ddof=1) < 2
+    alone = [measure.propagate(clean + rng.normal(0, 1.0, clean.shape), picture) for _ in range(24)]
+    values = np.array([each.measurands.value[0] for each in alone])
+    assert values.mean() - exact > 8 * values.std(ddof=1) / len(alone) ** 0.5  # negative control

@@ -198,7 +198,7 @@ def _corrected(
     from validation import kept
 
     with progress("simulating the picture for its bias", "renders", at_once=True):
-        return measure.corrected(plain, kept.correction(picture, method))
+        return measure.corrected(plain, kept.correction(picture, method), image)
 
 
 def _shapes_wanted(given: Options) -> dict[str, Any]:

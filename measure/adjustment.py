@@ -1,0 +1,186 @@
+"""What a picture itself tells of inputs that its scene is not sure of: what surfaces reflect, where lights stand.
+
+A face beside a wall that reflects more is brighter near its foot, one under a lamp that stands elsewhere shades
+otherwise. Means of square blocks of pixels that show no edge, less those of the simulated picture, are adjusted by
+least squares: the inputs' standard uncertainties are observations beside them (Mikhail and Ackermann, Observations and
+Least Squares, 1976). The brightness of each region that edges bound is free: no two faces of a part reflect quite
+alike. Where blocks do not fit, whatever is wrong counts as noise of theirs: as much as it makes sums of neighbouring
+blocks scatter more than noise does, for it goes together over faces.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import binary_dilation, gaussian_gradient_magnitude, label
+
+from imaging.sensor import full_scale, recorded
+from scenes import Picture
+
+_SIDE, _MOST = 8, 5000  # px of a block; of blocks: larger ones in larger images
+_STEEP = 1.0  # change over a pixel, in the noise's standard deviation, that is an edge's
+_NEAR_END = 4.0  # standard deviations of noise below the end of the scale
+_GROUPS = 1, 2, 4, 8, 16  # blocks a side whose sums tell whether they fit
+_ENOUGH = 4  # sums for each input, to tell it
+_CHANCE = 3.0  # standard deviations of products of noise, which are no information
+_LINEAR = 0.1  # of what a standard uncertainty does, that is not told by a multiple of it
+
+
+@dataclass(frozen=True, eq=False)
+class Adjustment:
+    """Of k inputs, in their standard uncertainties, by n blocks.
+
+    Attributes
+    ----------
+    side : int
+        Of a block, px.
+    at : ndarray of int, shape (n, 2)
+        Row and column of each, counted in blocks.
+    columns : ndarray, shape (n, k + 1)
+        What one standard uncertainty of each input changes of their mean levels, and the levels, above darkness.
+    region : ndarray of int, shape (n,)
+        Which region of the image each is in.
+    variance : ndarray, shape (n,)
+        Of the means by noise.
+    normal : ndarray, shape (k, k)
+        Information on the inputs.
+    dark : float
+        Level without light.
+    """
+
+    side: int
+    at: np.ndarray
+    columns: np.ndarray
+    region: np.ndarray
+    variance: np.ndarray
+    normal: np.ndarray
+    dark: float
+
+    @classmethod
+    def of(cls, renders: np.ndarray, picture: Picture) -> Adjustment | None:
+        """From two noise-free sets of images, of other rays.
+
+        Their noise would tell of inputs what is not there: products of two sets have none on the mean.
+
+        Parameters
+        ----------
+        renders : ndarray, shape (2, 2 + k, height, width)
+            Of each set one for the levels, and of rays that are the same ones in all of them one as the scene says and
+            with one input each changed.
+        picture : Picture
+
+        Returns
+        -------
+        Adjustment or None
+            None where too few blocks show no edge.
+        """
+        noise, clean = picture.scene.noise, renders[:, 0].mean(0)
+        side = _SIDE * math.ceil(math.sqrt(clean.size / _SIDE**2 / _MOST))
+        level, variance = recorded(noise, clean)
+        deviation = np.sqrt(np.broadcast_to(variance, clean.shape))
+        steep = gaussian_gradient_magnitude(clean, 1.0) > _STEEP * deviation
+        near = math.ceil(3 * picture.scene.camera.blur_px) + 1
+        lost = binary_dilation(steep, iterations=near) | (level > full_scale(noise) - _NEAR_END * deviation)
+        regions, _ = label(_means(lost[None], side)[0] == 0)
+        at = np.argwhere(regions)
+        if len(at) < _ENOUGH * renders.shape[1]:
+            return None
+        first, second = (_means(each, side)[:, at[:, 0], at[:, 1]].T for each in renders)
+        levels = (first[:, :1] + second[:, :1]) / 2 - noise.dark_level
+        own = _means(deviation[None] ** 2, side)[0, at[:, 0], at[:, 1]] / side**2
+        own = own + float(((first[:, 0] - second[:, 0]) ** 2).mean()) / 4
+        made = cls(
+            side, at, np.concatenate([(first + second)[:, 2:] / 2 - (first + second)[:, 1:2] / 2, levels], 1),
+            regions[tuple(at.T)], own, np.zeros(0), noise.dark_level,
+        )  # fmt: skip
+        one, other = (made._left(each[:, 2:] - each[:, 1:2]) for each in (first, second))
+        by_chance = _CHANCE / math.sqrt(len(at)) * (one - other).T @ (one - other) / 2
+        return replace(made, normal=_definite(one.T @ other - by_chance))
+
+    def _left(self, told: np.ndarray) -> np.ndarray:
+        """What of changes (n, m) each region's brightness does not explain, in standard deviations of noise."""
+        weight = 1 / np.sqrt(self.variance)
+        told, level = told * weight[:, None], self.columns[:, -1] * weight
+        for region in np.unique(self.region):
+            some = self.region == region
+            told[some] -= np.outer(level[some], level[some] @ told[some] / (level[some] @ level[some]))
+        return told
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of the inputs (k, k) once a picture is seen that is as its scene says but for them."""
+        return self._covariance(1.0)
+
+    def _covariance(self, misfit: float) -> np.ndarray:
+        inputs = np.eye(len(self.normal))
+        return (1 - _LINEAR**2) * np.linalg.inv(self.normal / misfit + inputs) + _LINEAR**2 * inputs
+
+    def inputs(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Errors of the inputs (k,) that a picture (height, width) shows, and their covariance (k, k)."""
+        seen = _means(image[None], self.side)[0, self.at[:, 0], self.at[:, 1]] - self.dark
+        left = self._left(np.concatenate([(seen - self.columns[:, -1])[:, None], self.columns[:, :-1]], 1))
+        off, columns = left[:, 0], left[:, 1:]
+        prior = np.eye(columns.shape[1])
+        misfit = self._misfit(off - columns @ np.linalg.solve(self.normal + prior, columns.T @ off))
+        found = np.linalg.solve(self.normal / misfit + prior, columns.T @ off / misfit)
+        return found, self._covariance(misfit)
+
+    def _misfit(self, left: np.ndarray) -> float:
+        """By how much more what is left (n,), in its standard deviations, scatters than noise, as a variance; 1 at
+        least."""
+        free, most = self.columns.shape[1] - 1 + len(np.unique(self.region)), 1.0
+        for size in _GROUPS:
+            _, group = np.unique(self.at // size, axis=0, return_inverse=True)
+            sums, counts = np.bincount(group.ravel(), left), np.bincount(group.ravel())
+            if len(sums) >= 2 * free:
+                most = max(most, float((sums**2 / counts).sum() / (len(sums) - free)))
+        return most
+
+
+@dataclass(frozen=True, eq=False)
+class Adjusted:
+    """How M values follow from inputs that a picture tells.
+
+    Attributes
+    ----------
+    adjustment : Adjustment
+        Of the inputs.
+    names : tuple of str, k
+        The source of uncertainty that each is of.
+    moved, moved_image : ndarray, shape (k, M)
+        What one standard uncertainty of each moves the values by, in the object and in the image.
+    """
+
+    adjustment: Adjustment
+    names: tuple[str, ...]
+    moved: np.ndarray
+    moved_image: np.ndarray
+
+    def sources(self, moved: np.ndarray) -> dict[str, np.ndarray]:
+        """Standard uncertainties (M,) by source; together they are that of the joint covariance."""
+        covariance = self.adjustment.covariance
+        groups = {name: [i for i, each in enumerate(self.names) if each == name] for name in dict.fromkeys(self.names)}
+        own = {name: variance(moved[some], covariance[np.ix_(some, some)]) for name, some in groups.items()}
+        with np.errstate(invalid="ignore", divide="ignore"):
+            part = np.sqrt(variance(moved, covariance) / sum(own.values()))
+            return {name: np.where(each > 0, np.sqrt(each) * part, np.sqrt(each)) for name, each in own.items()}
+
+
+def variance(moved: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Variances (M,) of values that k inputs with a covariance (k, k) move by so much, (k, M)."""
+    return np.einsum("im,ij,jm->m", moved, covariance, moved)
+
+
+def _means(images: np.ndarray, side: int) -> np.ndarray:
+    """Of whole blocks of images (m, height, width), shape (m, rows, columns)."""
+    rows, columns = images.shape[1] // side, images.shape[2] // side
+    cut = images[:, : rows * side, : columns * side].reshape(len(images), rows, side, columns, side)
+    return cut.mean((2, 4))
+
+
+def _definite(normal: np.ndarray) -> np.ndarray:
+    """The nearest matrix that takes nothing from any input."""
+    values, axes = np.linalg.eigh((normal + normal.T) / 2)
+    return (axes * np.maximum(values, 0.0)) @ axes.T
