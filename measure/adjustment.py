@@ -105,7 +105,8 @@ class Adjustment:
         told, level = told * weight[:, None], self.columns[:, -1] * weight
         for region in np.unique(self.region):
             some = self.region == region
-            told[some] -= np.outer(level[some], level[some] @ told[some] / (level[some] @ level[some]))
+            bright = level[some] / max(float(np.linalg.norm(level[some])), np.finfo(float).tiny)  # or dark all over
+            told[some] -= np.outer(bright, bright @ told[some])
         return told
 
     @property

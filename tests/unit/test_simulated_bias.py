@@ -24,6 +24,7 @@ from validation.remeasured import Method
 from validation.simulation import How
 
 POSES = (30, 90), (15, 270)
+ROUGH = Images((np.zeros((2, 2)),))
 
 
 @pytest.fixture(scope="module")
@@ -446,37 +447,40 @@ def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
     assert settled.renders is images.renders
 
 
-@pytest.mark.parametrize(("u", "below", "asked"), [(0.9, True, 0), (1.1, True, 1), (1.1, False, 0)])
-def test_more_rays_are_asked_for_where_a_bias_is_not_known_well_enough(picture, u, below, asked, monkeypatch):
-    """u(bias) a tenth below what is allowed is `ok`, above `clutter` until more rays tell; not above a megapixel."""
+@pytest.mark.parametrize(
+    ("u", "below", "asked"), [(0.9, True, []), (1.1, True, ["overall", "settled"]), (1.1, False, [])]
+)
+def test_more_is_rendered_where_a_bias_is_not_known_well_enough(picture, u, below, asked, monkeypatch):
+    """u(bias) a tenth below what is allowed is `ok`, above `clutter` until more tells; not above a megapixel."""
     made, done = _made(picture), []
     limit = allowed(float(made.sigma[0]))
     sources = {"rendering": np.array([0.0]), "light_place": np.array([u * limit])}
     doubtful = dataclasses.replace(made, sources=sources, simulated=("clutter",))
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
     monkeypatch.setattr(simulation, "LARGE", 1 << 20 if below else 1)
-    monkeypatch.setattr(simulation, "_completed", lambda *given: SimpleNamespace(renders=()))
-    monkeypatch.setattr(simulation, "_settled", lambda *given: done.append(given))
+    monkeypatch.setattr(simulation, "_completed", lambda *given: ROUGH)
+    monkeypatch.setattr(simulation, "_overall", lambda *given: done.append("overall"))
+    monkeypatch.setattr(simulation, "_settled", lambda *given: done.append("settled") or ROUGH)
     monkeypatch.setattr(simulation.measure, "correction", lambda *given: doubtful)
     monkeypatch.setattr(simulation.measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
     simulation._until_quiet(picture, Method("gradient"), _Rendered())
-    assert len(done) == asked
+    assert done == asked
 
 
-def test_methods_that_are_judged_together_share_the_rays_that_settle_them(picture, monkeypatch):
-    """Both are doubtful at first; the settled images are made once and tell both."""
-    rough, fine, made = SimpleNamespace(name="rough"), SimpleNamespace(name="fine"), []
-    found = {
-        name: _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])})
-        for name, u in (("rough", 9.0), ("fine", 0.1))
-    }
+def test_methods_that_are_judged_together_share_what_settles_them(picture, monkeypatch):
+    """Both are doubtful at first, and when the whole picture is rendered; settled images are made once, tell both."""
+    fine, made = Images(ROUGH.renders, known={"settled": (np.zeros(1), np.zeros(1))}), []
+    doubtful, sure = (
+        _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])}) for u in (9.0, 0.1)
+    )
     monkeypatch.setattr(How, "image", lambda how, picture, seed=0: seed)
-    monkeypatch.setattr(simulation, "_completed", lambda *given: rough)
-    monkeypatch.setattr(simulation, "_settled", lambda *given: made.append(given) or fine)
-    monkeypatch.setattr(simulation.measure, "correction", lambda images, *given: found[images.name])
+    monkeypatch.setattr(simulation, "_completed", lambda *given: ROUGH)
+    monkeypatch.setattr(simulation, "_overall", lambda *given: made.append("overall"))
+    monkeypatch.setattr(simulation, "_settled", lambda *given: made.append("settled") or fine)
+    monkeypatch.setattr(simulation.measure, "correction", lambda images, *given: sure if images.known else doubtful)
     told = simulation.independent(picture, (Method("gradient"), Method("canny")), ("image",), (None, None))
-    assert told == (found["fine"], found["fine"])
-    assert len(made) == 1
+    assert told == (sure, sure)
+    assert made == ["overall", "settled"]
 
 
 @pytest.mark.parametrize(("below", "fine"), [(True, 4), (False, 2)])

@@ -128,7 +128,17 @@ def test_outputs_may_lie_in_folders_that_do_not_exist_yet_and_in_those_that_do(t
     several = SimpleNamespace(scene=SimpleNamespace(quantities=[]), sets=[view])
     correction = given(
         **dict.fromkeys(
-            ("bias", "bias_image", "sources", "sources_image", "covariance", "covariance_image", "renders", "saturated")
+            (
+                "bias",
+                "bias_image",
+                "sources",
+                "sources_image",
+                "covariance",
+                "covariance_image",
+                "renders",
+                "saturated",
+                "adjusted",
+            )
         ),
         simulated=(),
     )
