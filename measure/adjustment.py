@@ -20,6 +20,7 @@ from imaging.sensor import full_scale, recorded
 from scenes import Picture
 
 _SIDE, _MOST = 8, 5000  # px of a block; of blocks: larger ones in larger images
+_LEAST = 9  # blocks of a region
 _STEEP = 1.0  # change over a pixel, in the noise's standard deviation, that is an edge's
 _NEAR_END = 4.0  # standard deviations of noise below the end of the scale
 _GROUPS = 1, 2, 4, 8, 16  # blocks a side whose sums tell whether they fit
@@ -44,8 +45,9 @@ class Adjustment:
         Which region of the image each is in.
     variance : ndarray, shape (n,)
         Of the means by noise.
-    normal : ndarray, shape (k, k)
-        Information on the inputs.
+    normal, spread : ndarray, shape (k, k)
+        What the products of blocks and columns are on the mean, times the inputs' errors, and their covariance by noise:
+        the same, but for the noise of rays in the columns, which is no information.
     dark : float
         Level without light.
     """
@@ -56,6 +58,7 @@ class Adjustment:
     region: np.ndarray
     variance: np.ndarray
     normal: np.ndarray
+    spread: np.ndarray
     dark: float
 
     @classmethod
@@ -83,21 +86,23 @@ class Adjustment:
         steep = gaussian_gradient_magnitude(clean, 1.0) > _STEEP * deviation
         near = math.ceil(3 * picture.scene.camera.blur_px) + 1
         lost = binary_dilation(steep, iterations=near) | (level > full_scale(noise) - _NEAR_END * deviation)
-        regions, _ = label(_means(lost[None], side)[0] == 0)
+        regions = _regions(_means(lost[None], side)[0] == 0)
         at = np.argwhere(regions)
         if len(at) < _ENOUGH * renders.shape[1]:
             return None
         first, second = (_means(each, side)[:, at[:, 0], at[:, 1]].T for each in renders)
         levels = (first[:, :1] + second[:, :1]) / 2 - noise.dark_level
         own = _means(deviation[None] ** 2, side)[0, at[:, 0], at[:, 1]] / side**2
-        own = own + float(((first[:, 0] - second[:, 0]) ** 2).mean()) / 4
+        region = regions[tuple(at.T)]
+        own += np.bincount(region, (first[:, 0] - second[:, 0]) ** 2)[region] / np.bincount(region)[region] / 4
         made = cls(
             side, at, np.concatenate([(first + second)[:, 2:] / 2 - (first + second)[:, 1:2] / 2, levels], 1),
-            regions[tuple(at.T)], own, np.zeros(0), noise.dark_level,
+            region, own, np.zeros(0), np.zeros(0), noise.dark_level,
         )  # fmt: skip
         one, other = (made._left(each[:, 2:] - each[:, 1:2]) for each in (first, second))
         by_chance = _CHANCE / math.sqrt(len(at)) * (one - other).T @ (one - other) / 2
-        return replace(made, normal=_definite(one.T @ other - by_chance))
+        both = (one + other) / 2
+        return replace(made, normal=_definite(one.T @ other - by_chance), spread=both.T @ both)
 
     def _left(self, told: np.ndarray) -> np.ndarray:
         """What of changes (n, m) each region's brightness does not explain, in standard deviations of noise."""
@@ -116,17 +121,20 @@ class Adjustment:
 
     def _covariance(self, misfit: float) -> np.ndarray:
         inputs = np.eye(len(self.normal))
-        return (1 - _LINEAR**2) * np.linalg.inv(self.normal / misfit + inputs) + _LINEAR**2 * inputs
+        return (1 - _LINEAR**2) * (inputs - self._gain(misfit) @ self.normal) + _LINEAR**2 * inputs
+
+    def _gain(self, misfit: float) -> np.ndarray:
+        """What the products of blocks and columns are multiplied with, so that the inputs' mean squares are least."""
+        spread = self.normal @ self.normal + misfit * self.spread
+        return self.normal @ np.linalg.inv(spread + np.finfo(float).eps * np.eye(len(spread)))
 
     def inputs(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Errors of the inputs (k,) that a picture (height, width) shows, and their covariance (k, k)."""
         seen = _means(image[None], self.side)[0, self.at[:, 0], self.at[:, 1]] - self.dark
         left = self._left(np.concatenate([(seen - self.columns[:, -1])[:, None], self.columns[:, :-1]], 1))
         off, columns = left[:, 0], left[:, 1:]
-        prior = np.eye(columns.shape[1])
-        misfit = self._misfit(off - columns @ np.linalg.solve(self.normal + prior, columns.T @ off))
-        found = np.linalg.solve(self.normal / misfit + prior, columns.T @ off / misfit)
-        return found, self._covariance(misfit)
+        misfit = self._misfit(off - columns @ (self._gain(1.0) @ (columns.T @ off)))
+        return self._gain(misfit) @ (columns.T @ off), self._covariance(misfit)
 
     def _misfit(self, left: np.ndarray) -> float:
         """By how much more what is left (n,), in its standard deviations, scatters than noise, as a variance; 1 at
@@ -172,6 +180,14 @@ class Adjusted:
 def variance(moved: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Variances (M,) of values that k inputs with a covariance (k, k) move by so much, (k, M)."""
     return np.einsum("im,ij,jm->m", moved, covariance, moved)
+
+
+def _regions(flat: np.ndarray) -> np.ndarray:
+    """Numbers of connected parts of an image of blocks, bool (rows, columns); 0 where it is not flat or a part is
+    small."""
+    regions, _ = label(flat)
+    small = np.bincount(regions.ravel()) < _LEAST
+    return np.where(small[regions], 0, regions)
 
 
 def _means(images: np.ndarray, side: int) -> np.ndarray:

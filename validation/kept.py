@@ -49,6 +49,7 @@ class _Adjusted(BaseModel):
     region: list[int]
     variance: list[Annotated[float, Field(gt=0)]]
     normal: list[list[float]]
+    spread: list[list[float]]
     dark: float
     names: list[Annotated[str, Field(max_length=40)]]
     moved: list[_Numbers]
@@ -59,15 +60,15 @@ class _Adjusted(BaseModel):
         n, k = len(self.at), len(self.names)
         values = *self.moved, *self.moved_image
         whole = len(self.columns) == len(self.region) == len(self.variance) == n
-        whole &= len(self.normal) == len(self.moved) == len(self.moved_image) == k
-        whole &= all(len(row) == k + 1 for row in self.columns) and all(len(row) == k for row in self.normal)
+        whole &= len(self.normal) == len(self.spread) == len(self.moved) == len(self.moved_image) == k
+        whole &= all(len(row) == k + 1 for row in self.columns)
+        whole &= all(len(row) == k for row in (*self.normal, *self.spread))
         whole &= all(len(row) == count for row in values)
         if not whole:
             return None
-        columns, variance, normal = (np.array(each, float) for each in (self.columns, self.variance, self.normal))
-        adjustment = Adjustment(
-            self.side, np.array(self.at, int), columns, np.array(self.region, int), variance, normal, self.dark
-        )
+        numbers = (np.array(each, float) for each in (self.variance, self.normal, self.spread))
+        at, region = (np.array(each, int) for each in (self.at, self.region))
+        adjustment = Adjustment(self.side, at, np.array(self.columns, float), region, *numbers, self.dark)
         moved = (np.array([_array(row) for row in each]) for each in (self.moved, self.moved_image))
         return Adjusted(adjustment, tuple(self.names), *moved)
 
