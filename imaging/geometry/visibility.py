@@ -41,7 +41,8 @@ def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
     """
     if solid.is_convex:
         return np.empty((*positions.shape[:-1], 0, 2))
-    different, which = np.unique(positions.reshape(-1, 3), axis=0, return_inverse=True)
+    rows = positions.reshape(-1, 3)
+    different, which = (rows, np.zeros(1, int)) if len(rows) == 1 else np.unique(rows, axis=0, return_inverse=True)
     spans = _hidden(solid, edge, different.tobytes())
     return spans[which].reshape(*positions.shape[:-1], *spans.shape[1:])
 

@@ -202,8 +202,7 @@ def side_signals(
     if is_plain(scene):
         level = face_signal(pictures, points[..., None, :, :], faces[:, :, None], 3, fall_off=fall_off)
         return np.where(facing(bodies, pictures.sensor_at)[..., faces, None], level, 0.0)
-    which = np.zeros(points.shape[-2], int)
-    return np.stack([_beside(pictures, [e], which, points[..., i, :, :], fall_off) for i, e in enumerate(edges)], -3)
+    return np.stack([_beside(pictures, e, points[..., i, :, :], fall_off) for i, e in enumerate(edges)], -3)
 
 
 def edge_contrast(pictures: Pictures, names: tuple[str, ...], fractions: np.ndarray) -> EdgeContrast:
@@ -286,34 +285,49 @@ def whites(scene: Scene) -> np.ndarray:
 
 def sides_of_one(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
     """`side_signals` of one picture at points (n, 3), each on one of the edges, ``which`` (n,); shape (2, n)."""
-    return _beside(pictures, edges, which, points, True)
+    found, clear = np.zeros((2, len(points))), _visible_on(pictures, edges, which, points)
+    if clear.any():
+        numbers, some = np.unique(which[clear], return_inverse=True)
+        found[:, clear] = _sides(pictures, [edges[k] for k in numbers], some, points[clear], clear[clear], True)
+    return found
 
 
-def _beside(
-    pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray, fall_off: bool
+def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) -> np.ndarray:
+    """The two sides (..., 2, n) of one edge at points (..., n, 3) of it."""
+    which = np.zeros(points.shape[-2], int)
+    return _sides(pictures, [edge], which, points, _visible_on(pictures, [edge], which, points), fall_off)
+
+
+def _sides(
+    pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray, clear: np.ndarray, fall_off: bool
 ) -> np.ndarray:
     """The two sides (..., 2, n) of edges at points (..., n, 3), each on one of them, ``which`` (n,), of a scene in
-    which things may hide and shade each other."""
+    which things may hide and shade each other; 0 where the sensor has no clear view (..., n)."""
     scene, bodies = pictures.scene, pictures.scene.bodies
-    faces = np.array([edge.faces for edge in edges])[which].T
-    free = partial(_seen_on, bodies, edges, which, _fractions(scene.solid, edges, which, points))
-    looked_at = _turned_on(bodies, edges, which, pictures.sensor_at)
-    visible = (looked_at.any(-2) & free(pictures.sensor_at))[..., None, :]
+    faces, fractions = np.array([edge.faces for edge in edges])[which].T, _fractions(scene.solid, edges, which, points)
     lit = tuple(
-        _turned_on(bodies, edges, which, at) & free(at)[..., None, :]
+        _turned_on(bodies, edges, which, at) & _seen_on(bodies, edges, which, fractions, at)[..., None, :]
         for at in (emitter.at for emitter in pictures.emitters)
     )
     level = face_signal(pictures, points[..., None, :, :], faces, 2, lit, fall_off=fall_off)
     level = level + light_between(pictures, points[..., None, :, :], faces)
-    found = np.where(visible & looked_at, level, 0.0)
+    looked_at = _turned_on(bodies, edges, which, pictures.sensor_at)
+    found = np.where(clear[..., None, :] & looked_at, level, 0.0)
     outward = bodies.normals[faces].sum(0)
     for side in (0, 1):
         # past an outer face that is turned away there is nothing but the background, for the ray leaves the convex hull
-        wanted = visible[..., 0, :] & ~looked_at[..., side, :] & (has_background(scene) | ~bodies.outer[faces[side]])
+        wanted = clear & ~looked_at[..., side, :] & (has_background(scene) | ~bodies.outer[faces[side]])
         if wanted.any():
             past = behind(pictures, points, wanted, faces.T, outward, fall_off=fall_off)
             found[..., side, :] = np.where(wanted, past, found[..., side, :])
     return found
+
+
+def _visible_on(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether the sensor sees points (..., n, 3) on edges and a face there, bool (..., n)."""
+    bodies, at = pictures.scene.bodies, pictures.sensor_at
+    fractions = _fractions(pictures.scene.solid, edges, which, points)
+    return _turned_on(bodies, edges, which, at).any(-2) & _seen_on(bodies, edges, which, fractions, at)
 
 
 def _fractions(solid: Solid, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
