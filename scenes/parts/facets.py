@@ -94,7 +94,7 @@ def facets(
     unsure = _unsure(shape, facet)
     within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
     curves |= within | _chords(shape, facet | unsure, smooth)
-    return Facets(region, smooth, curves & ~smooth)
+    return Facets(region, smooth, _along_lines(shape, curves & ~smooth, ~smooth))
 
 
 def _flush(shape: Chains, pieces: list[list[int]], linked: np.ndarray) -> np.ndarray:
@@ -259,6 +259,16 @@ def _chords(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
     goes_on = rows[turns_at(shape, rows, ends)[2]]
     straight[goes_on] = True
     return ~smooth & ~straight
+
+
+def _along_lines(shape: Chains, curves: np.ndarray, open_: np.ndarray) -> np.ndarray:
+    """Pieces of curved edges, and what continues them in a line where no other edge ends; bool, shape (C,).
+
+    An edge of the part ends where others do: a straight one does not become a curve in between.
+    """
+    pairs, ends, alone = meetings(shape, open_)
+    run = components(len(shape.bend), pairs[alone & turns_at(shape, pairs, ends)[2]])
+    return np.isin(run, run[curves]) & open_
 
 
 def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
