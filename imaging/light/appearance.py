@@ -285,7 +285,10 @@ def whites(scene: Scene) -> np.ndarray:
 
 def sides_of_one(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
     """`side_signals` of one picture at points (n, 3), each on one of the edges, ``which`` (n,); shape (2, n)."""
-    found, clear = np.zeros((2, len(points))), _visible_on(pictures, edges, which, points)
+    found = np.zeros((2, len(points)))
+    if not edges:
+        return found
+    clear = _visible_on(pictures, edges, which, points)
     if clear.any():
         numbers, some = np.unique(which[clear], return_inverse=True)
         found[:, clear] = _sides(pictures, [edges[k] for k in numbers], some, points[clear], clear[clear], True)

@@ -68,12 +68,13 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.cs
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
-        fit = tool.fit(points.valid)
+        used = tool.as_expected(points.valid, points.contrast)
+        fit = tool.fit(used)
         change = tool.solve(fit, points.offset)[0]
         if not _is_far(tool, change[None])[0]:
             break
         moved = _rounded(tool, np.array(moved) + change)
-    taken = points.valid[0] & (tool.weights > 0)
+    taken = used[0] & (tool.weights > 0)
     return sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
 
 
@@ -152,7 +153,7 @@ def _measured(images: Stack | Drawn, tool: RimTool) -> Circles:
     used = images.at(tool.locator.pixels)
     points = tool.locator.locate_each_in(used)
     taken = tool.weights > 0
-    fit = tool.fit(points.valid)
+    fit = tool.fit(tool.as_expected(points.valid, points.contrast))
     errors = tool.solve(fit, points.offset)
     clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
     part = (points.valid & clear)[:, taken].sum(1) / max(taken.sum(), 1)
@@ -219,9 +220,10 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         held(places[keep], optics), (gradient / size[:, None])[keep], size[keep],
         np.stack([along @ one, along @ two], -1)[keep], (design[:, 2] * circle.radius / (2 * speed**2))[keep],
     )  # fmt: skip
+    told = None if seen is None else np.sqrt(seen.squared)[keep]
     signs = None if seen is None else np.where(seen.brightens, 1.0, -1.0)[keep]
     locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain, signs=signs)
-    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve.places, curve)
+    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve.places, curve, told)
 
 
 def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
