@@ -117,6 +117,8 @@ def test_pieces_are_joined_between_the_same_surfaces_alone():
     some = joined(vertices, chains, normals, region, np.array([True, False, True, True]))
     assert [sorted(ends) for ends, *_ in some] == [[0, 1], [2, 3], [3, 4]]
     flat = np.array([[0, 0, 1.0], [0, -1, 0], [0, -1, 0], [0, -0.8, 0.6]])
+    facets = joined(vertices, chains, flat, np.array([-1, 5, 6, 7]), np.array([True] * 4))
+    assert [sorted(ends) for ends, *_ in facets] == [[0, 2], [2, 3], [3, 4]]  # in one plane, whatever they are of
     plane = joined(vertices, chains, flat, np.full(4, -1), np.array([True] * 4))
     assert [sorted(ends) for ends, *_ in plane] == [[0, 2], [2, 3], [3, 4]]
 
