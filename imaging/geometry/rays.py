@@ -344,7 +344,8 @@ class Plates:
         hit, t = self.met(other, origins[ray], vectors[ray])
         with np.errstate(invalid="ignore"):
             within = self._shares(other, origins[ray] + t[:, None] * vectors[ray]) * self._heights[:, other]
-            hit &= (within.min(0) >= -_HAIR * self.farthest) & (t <= most[ray]) & ~_among(self.faces[other], _of_rays(own, ray))
+            hit &= (within.min(0) >= -_HAIR * self.farthest) & (t <= most[ray])
+            hit &= ~_among(self.faces[other], _of_rays(own, ray))
         ray, other, t = ray[hit], other[hit], t[hit]
         order = np.lexsort((other, t, ray))[::-1]  # the first of each ray is written last
         triangle[ray[order]], place[ray[order]] = other[order], t[order]

@@ -78,10 +78,7 @@ def _divided(shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
     every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
     if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
         raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(cut)}")
-    return [
-        {**_surface(face), **_triangles(divided)}
-        for face, divided in zip(_faces(shape), _faces(cut), strict=True)
-    ]
+    return [{**_surface(face), **_triangles(divided)} for face, divided in zip(_faces(shape), _faces(cut), strict=True)]
 
 
 def _said(reader: Any) -> Callable[[Any], dict[str, Any]]:

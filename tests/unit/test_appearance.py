@@ -14,8 +14,8 @@ from imaging.light.appearance import (
     floor_signal,
     paper_contrast2,
     side_signals,
-    signal,
     sides_of_one,
+    signal,
 )
 from imaging.pictures import Pictures
 from scenes import Floor, Noise, Obstacle, Picture
@@ -152,7 +152,8 @@ def test_sides_of_many_edges_of_one_picture_are_those_of_each(task1, sensor, lig
             side_signals(pictures, (edges[number].name,), point[None, None])[0, :, 0]
             for number, point in zip(which, points, strict=True)
         ]
-        assert found.T == pytest.approx(np.array(each), rel=1e-9, abs=1e-9)
+        levels = np.array(each)
+        assert pytest.approx(levels, rel=1e-9, abs=1e-9) == found.T
         lit = found > 0
         assert lit.any(0).mean() > 0.3  # margin: some are hidden
         assert not lit.any(0).all()

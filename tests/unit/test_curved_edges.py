@@ -67,7 +67,7 @@ def test_an_edge_between_planes_is_straight_however_it_turns():
 
 @pytest.mark.parametrize(("turn", "others", "found"), [(0.0, (), 3), (1.0, (), 2), (0.0, (2,), 2)])
 def test_what_continues_a_curved_edge_in_a_line_is_a_piece_of_it_up_to_where_others_end(turn, others, found):
-    """Two pieces of a curve, then one in their line, or one that turns, or beyond a vertex in which another edge ends."""
+    """Two pieces of a curve, then one in their line, one that turns, or one beyond a vertex where another edge ends."""
     way = np.radians(np.cumsum([0.0, 10.0, turn]))
     steps = np.stack([np.cos(way), np.sin(way), 0 * way], -1)
     vertices = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, 0), np.full((1, 3), 9.0)])
