@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.parts.chains import Chain, Chains, components, pairs_of
+from scenes.parts.cones import chords
 from scenes.parts.curves import curved, meetings, turns_at
 from scenes.parts.rims import Rim
 
@@ -94,6 +95,7 @@ def facets(
     unsure = _unsure(shape, facet)
     within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
     curves |= within | _chords(shape, facet | unsure, smooth)
+    curves |= chords(vertices, shape, normals, region, smooth, ~smooth & ~curves)
     return Facets(region, smooth, _along_lines(shape, curves & ~smooth, ~smooth))
 
 
