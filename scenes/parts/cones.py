@@ -16,7 +16,7 @@ from scenes.parts.surfaces import axes_beside
 _SIDES = 4  # of a facet, at most: those of more are planes that a surface continues
 _CORNERS = 10  # that tell a surface: its six numbers and more
 _STEPS, _STEP = 20, 0.3  # of Gauss-Newton's method, at most; of the surface's size, each at most
-_EXACT = 1e-12  # of the surface's size: a step that changes nothing any more
+_EXACT = 1e-9  # of the surface's size: a step that changes nothing that single precision shows
 _TOLD = 1e-4  # smallest over largest singular value of what tells the six numbers
 _ON = 0.5  # of what single precision leaves of two places: how far corners may lie off a surface that is told
 
@@ -63,7 +63,9 @@ class Axial:
             found, step, told = found._better((points - middle) / size)
             if step <= _EXACT:
                 break
-        return cls(middle + size * found.point, found.axis, size * found.radius, found.slope) if told >= _TOLD else None
+        if step > _EXACT or told < _TOLD:
+            return None
+        return cls(middle + size * found.point, found.axis, size * found.radius, found.slope)
 
     @classmethod
     def _near(cls, points: np.ndarray, normals: np.ndarray) -> Axial | None:
