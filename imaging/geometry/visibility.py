@@ -207,6 +207,8 @@ def boundaries(solid: Solid, edges: Sequence[Edge], faces: np.ndarray) -> np.nda
 def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray) -> np.ndarray:
     """Which points of an edge nothing hides from a position, whatever way the edge's own faces turn.
 
+    The end of what is hidden is seen: it is asked for, and rounding must not decide what is there.
+
     Parameters
     ----------
     positions : ndarray, shape (..., 3)
@@ -220,7 +222,7 @@ def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray)
     shape = np.broadcast_shapes((*positions.shape[:-1], 1), fractions.shape)
     clear = np.ones(shape, bool)
     for start, stop in np.moveaxis(hidden_spans(solid, edge, positions), (-2, -1), (0, 1)):
-        clear &= (fractions <= start[..., None]) | (fractions >= stop[..., None])
+        clear &= (fractions <= start[..., None] + _BEFORE) | (fractions >= stop[..., None] - _BEFORE)
     return clear
 
 

@@ -336,6 +336,9 @@ def _visible_on(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, po
 def _fractions(solid: Solid, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Of the edges' lengths at which points (..., n, 3) lie, (..., n)."""
     ends = solid.vertices[[edge.ends for edge in edges]]
+    if len(edges) == 1:
+        start, way = ends[0, 0], ends[0, 1] - ends[0, 0]
+        return (points - start) @ way / (way @ way)
     start, way = ends[which, 0], (ends[:, 1] - ends[:, 0])[which]
     return np.einsum("...ni,ni->...n", points - start, way) / np.einsum("ni,ni->n", way, way)
 
