@@ -18,7 +18,7 @@ import numpy as np
 
 from scenes.parts.chains import Chain, Chains, components, pairs_of
 from scenes.parts.cones import chords
-from scenes.parts.curves import curved, meetings, turns_at
+from scenes.parts.curves import LONGER, curved, meetings, turns_at
 from scenes.parts.rims import Rim
 
 _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
@@ -266,11 +266,14 @@ def _chords(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
 def _along_lines(shape: Chains, curves: np.ndarray, open_: np.ndarray) -> np.ndarray:
     """Pieces of curved edges, and what continues them in a line where no other edge ends; bool, shape (C,).
 
-    An edge of the part ends where others do: a straight one does not become a curve in between.
+    An edge of the part ends where others do: a straight one does not become a curve in between, if it is not much
+    longer than the curve's pieces there, as beside a sliver.
     """
     pairs, ends, alone = meetings(shape, open_)
     run = components(len(shape.bend), pairs[alone & turns_at(shape, pairs, ends)[2]])
-    return np.isin(run, run[curves]) & open_
+    of_curves = np.bincount(run, shape.length * curves)
+    straight = np.bincount(run, shape.length * (open_ & ~curves))
+    return curves | (straight <= LONGER * of_curves)[run] & open_ & (of_curves > 0)[run]
 
 
 def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
