@@ -6,6 +6,7 @@ ray through the place meets the face's plane.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,7 +16,7 @@ from imaging.blurred.segment import Segments
 from imaging.geometry.projection import camera_frame, depth, edge_points, facing, from_axis
 from imaging.geometry.visibility import boundaries
 from imaging.geometry.visibility import seen as visible_at
-from imaging.light.appearance import face_signal, is_plain, side_signals
+from imaging.light.appearance import face_signal, is_plain, side_signals, sides_of_one
 from imaging.light.between import light_between
 from imaging.pictures import Pictures
 from scenes import Edge, Solid
@@ -236,13 +237,29 @@ def _looked_at(pictures: Pictures, picture: np.ndarray, other: np.ndarray, neare
     """Levels (P, 2) beside edges ``other`` at fractions of their images, as the sensor sees them."""
     solid = pictures.scene.solid
     beside, levels = sided(solid), np.empty((other.size, 2))
-    for which in np.unique(other):
-        edge, rows = solid.edges[which], np.flatnonzero(other == which)
-        spatial = _in_space(pictures, solid, edge, picture[rows], nearest[rows])
-        alone = pictures.at(*_of_each(pictures, picture[rows]))
-        found = side_signals(alone, (edge.name,), edge_points(solid, (edge.name,), spatial[:, None, None]))[:, 0, :, 0]
-        levels[rows] = found if beside[which, 0] == edge.faces[0] else found[:, ::-1]
-    return levels
+    numbers, which = np.unique(other, return_inverse=True)
+    edges = [solid.edges[number] for number in numbers]
+    if len(pictures.sensors) == 1:
+        levels = _in_one(pictures, edges, which, nearest)
+    else:
+        for number, edge in enumerate(edges):
+            rows = np.flatnonzero(which == number)
+            spatial = _in_space(pictures, solid, edge, picture[rows], nearest[rows])
+            alone = pictures.at(*_of_each(pictures, picture[rows]))
+            points = edge_points(solid, (edge.name,), spatial[:, None, None])
+            levels[rows] = side_signals(alone, (edge.name,), points)[:, 0, :, 0]
+    first = np.array([edge.faces[0] for edge in edges], int)[which]
+    return np.where((beside[other, 0] == first)[:, None], levels, levels[:, ::-1])
+
+
+def _in_one(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """The same of one picture, all edges at once: levels (P, 2) of the sides of edges, ``which`` (P,)."""
+    vertices, alone = pictures.scene.solid.vertices, pictures.at(*_of_each(pictures, 0))
+    ends = vertices[np.array([edge.ends for edge in edges], int).reshape(-1, 2)]
+    near, far = np.moveaxis(depth(ends, alone.sensors, pictures.scene.camera)[which], 1, 0)
+    spatial = fractions * near / (far + fractions * (near - far))
+    start, stop = np.moveaxis(ends[which], 1, 0)
+    return sides_of_one(alone, edges, which, start + spatial[:, None] * (stop - start)).T
 
 
 def _shown(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: np.ndarray) -> np.ndarray:

@@ -143,12 +143,14 @@ def _disturbed(pictures: Pictures, outline: LimbOutline, far: float) -> np.ndarr
         if rows.any():
             found[rows] |= to_curve(at[rows], image(places, rows), rim.joined(shown(places, rows))) < far
     ends = solid.vertices[np.array([edge.ends for edge in solid.lines], int)].reshape(-1, 2, 3)
-    near = is_near(image(ends.reshape(-1, 3)).reshape(*at.shape[:-2], -1, 2, 2))
+    lines = image(ends.reshape(-1, 3)).reshape(*at.shape[:-2], -1, 2, 2)
+    near = is_near(lines)
     for number in np.flatnonzero(near.any(tuple(range(near.ndim - 1)))):
         rows, (start, stop) = near[..., number], ends[number]
-        places = start + np.linspace(0, 1, _ALONG)[:, None] * (stop - start)
-        beside = to_curve(at[rows], image(places, rows)) < far
-        found[rows] |= beside & shown(places, rows).any(-1, keepdims=True)
+        beside = to_curve(at[rows], lines[..., number, :, :][rows]) < far
+        if beside.any():
+            places = start + np.linspace(0, 1, _ALONG)[:, None] * (stop - start)
+            found[rows] |= beside & shown(places, rows).any(-1, keepdims=True)
     return found
 
 

@@ -19,6 +19,9 @@ try:  # has wheels for x86-64
 except ImportError:
     rtcore_scene = None
 
+Own = tuple[int, ...] | np.ndarray
+"""Faces that no ray, or rays (n, k) each, cannot meet."""
+
 _CHUNK = 50_000  # ray-triangle pairs at a time
 _BUNDLE = 1024  # rays for which triangles that none of them comes near are left out together
 _MANY, _FEW = 2000, 64  # triangles from which on rays are sorted, and bundles of them divided into some of so few
@@ -34,7 +37,7 @@ _EACH = 4  # faces that are looked for one by one: faster than to sort them
 
 
 def first_face(
-    solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...], *, margin: float = 0.0
+    solid: Solid, origins: np.ndarray, vectors: np.ndarray, own: Own, *, margin: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """The first face whose outside a ray meets.
 
@@ -42,8 +45,8 @@ def first_face(
     ----------
     origins, vectors : ndarray, shape (..., 3)
         The ray is origin + t vector, t > 0.
-    own : tuple of int
-        Faces that cannot be met.
+    own : tuple of int, or ndarray of int, shape (..., k)
+        Faces that cannot be met, by any ray or by each.
     margin : float
         Of the part's size. What passes a triangle's side more closely is decided in double precision: the same on every
         processor, where single precision alone may take either.
@@ -57,6 +60,7 @@ def first_face(
     """
     shape = origins.shape[:-1]
     rays = np.reshape(origins, (-1, 3)), np.reshape(vectors, (-1, 3))
+    own = own.reshape(-1, own.shape[-1]) if isinstance(own, np.ndarray) else own
     face, t = (by_embree if has_embree() else by_trial)(_plates(solid, margin), *rays, own)
     return face.reshape(shape), t.reshape(shape)
 
@@ -66,10 +70,10 @@ def has_embree() -> bool:
     return rtcore_scene is not None
 
 
-def by_trial(
-    plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...]
-) -> tuple[np.ndarray, np.ndarray]:
+def by_trial(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own) -> tuple[np.ndarray, np.ndarray]:
     """`first_face` of rays (n, 3), every triangle tried that may be near."""
+    if isinstance(own, np.ndarray):
+        return _by_trial_of_each(plates, origins, vectors, own)
     if own:
         plates = plates.some(~np.isin(plates.faces, own))
     if len(plates.faces) <= _MANY:
@@ -80,9 +84,19 @@ def by_trial(
     return face, t
 
 
-def by_embree(
-    plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: tuple[int, ...]
+def _by_trial_of_each(
+    plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
+    """The same where each ray has faces (n, k) that it cannot meet."""
+    face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
+    different, which = np.unique(own, axis=0, return_inverse=True)
+    for number, faces in enumerate(different.tolist()):
+        rays = np.flatnonzero(which == number)
+        face[rays], t[rays] = by_trial(plates, origins[rays], vectors[rays], tuple(faces))
+    return face, t
+
+
+def by_embree(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own) -> tuple[np.ndarray, np.ndarray]:
     """`first_face` of rays (n, 3): Embree names triangles, one behind the other, until one is met from outside.
 
     Places are those of the triangles' planes in double precision. Rays begin where they enter the sphere about the
@@ -106,12 +120,14 @@ def by_embree(
         last[rays] = which
         at[rays] += (away.astype(float) * plates.radius + step[rays]) / lengths[rays]
         outside, place = plates.met(which, origins[rays], vectors[rays])
-        outside &= ~_among(plates.faces[which], own)
+        outside &= ~_among(plates.faces[which], _of_rays(own, rays))
         if plates.margin:
             near = ~plates.well_within(which, origins[rays] + place[:, None] * vectors[rays])
             some = rays[near]
             most = np.maximum(at[some], np.where(outside, place, 0.0)[near]) + _BENT * plates.radius / lengths[some]
-            which[near], place[near] = plates.met_beside(which[near], origins[some], vectors[some], most, own)
+            which[near], place[near] = plates.met_beside(
+                which[near], origins[some], vectors[some], most, _of_rays(own, some)
+            )
             outside[near] = np.isfinite(place[near])
         face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
         rays = rays[~outside]
@@ -124,8 +140,15 @@ def _squared(vectors: np.ndarray) -> np.ndarray:
     return x**2 + y**2 + z**2
 
 
-def _among(faces: np.ndarray, some: tuple[int, ...]) -> np.ndarray:
+def _of_rays(own: Own, rays: np.ndarray) -> Own:
+    """Faces that some of the rays cannot meet."""
+    return own[rays] if isinstance(own, np.ndarray) else own
+
+
+def _among(faces: np.ndarray, some: Own) -> np.ndarray:
     """Whether faces (n,) are among some others, bool (n,); of the few that meet in an edge each is looked for."""
+    if isinstance(some, np.ndarray):
+        return (faces[:, None] == some).any(1)
     if len(some) > _EACH:
         return np.isin(faces, some)
     found = np.zeros(len(faces), bool)
@@ -306,7 +329,7 @@ class Plates:
             return (fall < 0) & (over > 0) & (place > _STEP), place
 
     def met_beside(
-        self, which: np.ndarray, origins: np.ndarray, vectors: np.ndarray, most: np.ndarray, own: tuple[int, ...]
+        self, which: np.ndarray, origins: np.ndarray, vectors: np.ndarray, most: np.ndarray, own: Own
     ) -> tuple[np.ndarray, np.ndarray]:
         """What rays (n, 3) meet first, in double precision, of triangles (n,) and those that share a corner with them.
 
@@ -321,7 +344,8 @@ class Plates:
         hit, t = self.met(other, origins[ray], vectors[ray])
         with np.errstate(invalid="ignore"):
             within = self._shares(other, origins[ray] + t[:, None] * vectors[ray]) * self._heights[:, other]
-            hit &= (within.min(0) >= -_HAIR * self.farthest) & (t <= most[ray]) & ~_among(self.faces[other], own)
+            hit &= (within.min(0) >= -_HAIR * self.farthest) & (t <= most[ray])
+            hit &= ~_among(self.faces[other], _of_rays(own, ray))
         ray, other, t = ray[hit], other[hit], t[hit]
         order = np.lexsort((other, t, ray))[::-1]  # the first of each ray is written last
         triangle[ray[order]], place[ray[order]] = other[order], t[order]

@@ -16,7 +16,10 @@ import numpy as np
 from imaging.geometry.projection import above
 from scenes import Edge, Solid
 
-_PAIRS = 20_000  # positions times triangles at once: what hides from one of many is looked for from each of them
+_PAIRS = 20_000  # positions times triangles at once that are asked whether they reach the plane of position and edge
+_ROWS = 32  # positions at once of which spans are found
+_ONWARD, _BACK = [1, 2, 0], [2, 0, 1]
+_KEPT = 100_000  # triangles of a part of which it is kept which turn to a position: 1 MB a position
 _BEFORE = 1e-9  # a triangle that touches the edge does not hide it; nothing is seen through a gap of this size
 
 
@@ -38,7 +41,8 @@ def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
     """
     if solid.is_convex:
         return np.empty((*positions.shape[:-1], 0, 2))
-    different, which = np.unique(positions.reshape(-1, 3), axis=0, return_inverse=True)
+    rows = positions.reshape(-1, 3)
+    different, which = (rows, np.zeros(1, int)) if len(rows) == 1 else np.unique(rows, axis=0, return_inverse=True)
     spans = _hidden(solid, edge, different.tobytes())
     return spans[which].reshape(*positions.shape[:-1], *spans.shape[1:])
 
@@ -47,41 +51,81 @@ def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
 def _hidden(solid: Solid, edge: Edge, positions: bytes) -> np.ndarray:
     """The same for different positions, shape (n, K, 2)."""
     rows = np.frombuffer(positions).reshape(-1, 3)
-    size = max(1, _PAIRS // len(solid.triangles))
-    parts = [_united(_by_triangle(solid, edge, rows[at : at + size])) for at in range(0, len(rows), size)]
+    parts = [_united(_by_triangle(solid, edge, rows[at : at + _ROWS])) for at in range(0, len(rows), _ROWS)]
     spans = np.empty((len(rows), max((part.shape[-2] for part in parts), default=0), 2))
     spans[:] = 1.0, 0.0
-    for part, at in zip(parts, range(0, len(rows), size), strict=True):
-        spans[at : at + size, : part.shape[-2]] = part
+    for part, at in zip(parts, range(0, len(rows), _ROWS), strict=True):
+        spans[at : at + _ROWS, : part.shape[-2]] = part
     return spans
 
 
 def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
-    """The interval that each of those triangles hides which may hide any; from > to for none; shape (..., T, 2).
+    """The intervals that triangles hide from positions (n, 3), shape (n, K, 2); (1, 0) for none.
 
     What is hidden from outside is hidden by a triangle that turns to the position: there the ray enters the solid.
     """
-    towards = above(positions, solid.normals, solid.offsets).any(tuple(range(positions.ndim - 1)))
-    towards[list(edge.faces)] = False
     start, stop = (solid.vertices[end] - positions for end in edge.ends)
-    normal = np.cross(start, stop)
+    normal = _cross(start, stop)
     with np.errstate(divide="ignore", invalid="ignore"):
-        normal = normal / np.einsum("...i,...i->...", normal, normal)[..., None]  # NaN where the edge is seen end-on
-    points, corners = solid.triangle_corners
-    sides = _coordinates(points, positions, normal)
+        normal = normal / np.einsum("ni,ni->n", normal, normal)[:, None]  # NaN where the edge is seen end-on
+    size = max(1, _PAIRS // len(solid.triangles))
+    parts = [_reaching(solid, edge, positions[at : at + size], normal[at : at + size])
+             for at in range(0, len(positions), size)]  # fmt: skip
+    row = np.concatenate([part[0] + k * size for k, part in enumerate(parts)])
+    corners, sides = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    points = solid.triangle_corners[0][corners] - positions[row, None]
+    a, b = (np.einsum("kci,ki->kc", points, axis[row]) for axis in (_cross(stop, normal), _cross(normal, start)))
+    spans = _merge(*_crossings(a, b, sides))
+    hides = spans[:, 0] < spans[:, 1]
+    return _in_rows(row[hides], spans[hides], len(positions))
+
+
+def _reaching(
+    solid: Solid, edge: Edge, positions: np.ndarray, normal: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles that the plane of a position (n, 3) and the edge crosses, K of them: the position's number (K,), their
+    corners' (K, 3), and how far these lie from the plane of a ``normal`` (n, 3)."""
+    facing, faces = _facing(solid, positions)
+    sides = _coordinates(solid.triangle_corners[0], positions, normal)
     over = sides >= 0
-    one, two, three = (over[..., each] for each in corners.T)
-    some = (one != two) | (two != three)  # the others do not reach the plane of position and edge
-    some = some.any(tuple(range(some.ndim - 1))) & towards[solid.triangle_faces]
-    chosen = corners[some]
-    a, b = (_coordinates(points[chosen], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start)))
-    return _merge(*_crossings(a, b, sides[..., chosen]))
+    one, two, three = (over.take(each, -1) for each in facing)
+    row, some = np.nonzero((one != two) | (two != three))
+    others = (faces[some, None] != edge.faces).all(1)
+    row, corners = row[others], facing[:, some[others]].T
+    return row, corners, sides[row[:, None], corners]
+
+
+def _in_rows(row: np.ndarray, spans: np.ndarray, count: int) -> np.ndarray:
+    """Intervals (k, 2) of rising rows (k,) as (count, K, 2); (1, 0) where a row has less."""
+    many = np.bincount(row, minlength=count)
+    found = np.empty((count, int(many.max(initial=0)), 2))
+    found[:] = 1.0, 0.0
+    found[row, np.arange(len(row)) - (np.cumsum(many) - many)[row]] = spans
+    return found
+
+
+def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Of vectors (n, 3); several times as fast as NumPy's of few of them."""
+    return one[:, _ONWARD] * other[:, _BACK] - one[:, _BACK] * other[:, _ONWARD]
+
+
+def _facing(solid: Solid, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that turn to any of the positions: their corners' numbers (3, T) and their faces (T,)."""
+    found = _kept_facing if len(solid.triangles) <= _KEPT else _kept_facing.__wrapped__
+    return found(solid, positions.tobytes())
+
+
+@lru_cache(maxsize=64)  # asked for of each edge in turn
+def _kept_facing(solid: Solid, positions: bytes) -> tuple[np.ndarray, np.ndarray]:
+    rows = np.frombuffer(positions).reshape(-1, 3)
+    towards = above(rows, solid.normals, solid.offsets).any(0)
+    some = np.flatnonzero(towards[solid.triangle_faces])
+    return np.ascontiguousarray(solid.triangle_corners[1][some].T), solid.triangle_faces[some]
 
 
 def _coordinates(points: np.ndarray, positions: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Coordinates of points (..., 3) along axes (n, 3), or one, from the positions, shape (n, ...)."""
-    along = axis @ points.reshape(-1, 3).T - np.einsum("...j,...j->...", axis, positions)[..., None]
-    return along.reshape(*along.shape[:-1], *points.shape[:-1])
+    """Coordinates of points (p, 3) along axes (n, 3) from the positions (n, 3), shape (n, p)."""
+    return axis @ points.T - np.einsum("nj,nj->n", axis, positions)[:, None]
 
 
 def _united(spans: np.ndarray) -> np.ndarray:
@@ -163,6 +207,8 @@ def boundaries(solid: Solid, edges: Sequence[Edge], faces: np.ndarray) -> np.nda
 def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray) -> np.ndarray:
     """Which points of an edge nothing hides from a position, whatever way the edge's own faces turn.
 
+    The end of what is hidden is seen: it is asked for, and rounding must not decide what is there.
+
     Parameters
     ----------
     positions : ndarray, shape (..., 3)
@@ -176,7 +222,7 @@ def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray)
     shape = np.broadcast_shapes((*positions.shape[:-1], 1), fractions.shape)
     clear = np.ones(shape, bool)
     for start, stop in np.moveaxis(hidden_spans(solid, edge, positions), (-2, -1), (0, 1)):
-        clear &= (fractions <= start[..., None]) | (fractions >= stop[..., None])
+        clear &= (fractions <= start[..., None] + _BEFORE) | (fractions >= stop[..., None] - _BEFORE)
     return clear
 
 

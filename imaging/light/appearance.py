@@ -6,6 +6,7 @@ noise; `imaging.sensor` makes recorded levels of them. What no formula knows (in
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from imaging import sensor
 from imaging.geometry.projection import camera_frame, edge_points, facing
-from imaging.geometry.rays import first_face, reaches
+from imaging.geometry.rays import Own, first_face, reaches
 from imaging.geometry.visibility import seen, turned
 from imaging.light.backlight import backlights, backlit
 from imaging.light.between import light_between
@@ -21,7 +22,7 @@ from imaging.light.emitters import is_point
 from imaging.light.irradiance import bands, beam, electric_field, squared_distance, widened
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
-from scenes import Brdf, Edge, Floor, Material, Scene
+from scenes import Brdf, Edge, Floor, Material, Scene, Solid
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NEAR = 1e-3  # of the object's size: from the sensor, where a ray begins
@@ -282,32 +283,87 @@ def whites(scene: Scene) -> np.ndarray:
     return scene.camera.exposure * np.array(each)[scene.surfaces.kinds]
 
 
+def sides_of_one(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """`side_signals` of one picture at points (n, 3), each on one of the edges, ``which`` (n,); shape (2, n)."""
+    found = np.zeros((2, len(points)))
+    if not edges:
+        return found
+    clear = _visible_on(pictures, edges, which, points)
+    if clear.any():
+        numbers, some = np.unique(which[clear], return_inverse=True)
+        found[:, clear] = _sides(pictures, [edges[k] for k in numbers], some, points[clear], clear[clear], True)
+    return found
+
+
 def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) -> np.ndarray:
-    """The two sides (..., 2, n) of one edge of a scene in which things may hide and shade each other."""
+    """The two sides (..., 2, n) of one edge at points (..., n, 3) of it."""
+    which = np.zeros(points.shape[-2], int)
+    return _sides(pictures, [edge], which, points, _visible_on(pictures, [edge], which, points), fall_off)
+
+
+def _sides(
+    pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray, clear: np.ndarray, fall_off: bool
+) -> np.ndarray:
+    """The two sides (..., 2, n) of edges at points (..., n, 3), each on one of them, ``which`` (n,), of a scene in
+    which things may hide and shade each other; 0 where the sensor has no clear view (..., n)."""
     scene, bodies = pictures.scene, pictures.scene.bodies
-    start, stop = scene.solid.vertices[list(edge.ends)]
-    fractions = (points - start) @ (stop - start) / ((stop - start) @ (stop - start))
+    faces, fractions = np.array([edge.faces for edge in edges])[which].T, _fractions(scene.solid, edges, which, points)
     lit = tuple(
-        turned(bodies, edge, at)[..., None] & seen(bodies, edge, at, fractions)[..., None, :]
+        _turned_on(bodies, edges, which, at) & _seen_on(bodies, edges, which, fractions, at)[..., None, :]
         for at in (emitter.at for emitter in pictures.emitters)
     )
-    level = face_signal(pictures, points[..., None, :, :], np.array(edge.faces)[:, None], 2, lit, fall_off=fall_off)
-    level = level + light_between(pictures, points[..., None, :, :], np.array(edge.faces)[:, None])
-    looked_at = turned(bodies, edge, pictures.sensor_at)[..., None]
-    visible = (looked_at.any(-2) & seen(bodies, edge, pictures.sensor_at, fractions))[..., None, :]
-    found = np.where(visible & looked_at, level, 0.0)
-    outward = bodies.normals[list(edge.faces)].sum(0)
-    for side, face in enumerate(edge.faces):
+    level = face_signal(pictures, points[..., None, :, :], faces, 2, lit, fall_off=fall_off)
+    level = level + light_between(pictures, points[..., None, :, :], faces)
+    looked_at = _turned_on(bodies, edges, which, pictures.sensor_at)
+    found = np.where(clear[..., None, :] & looked_at, level, 0.0)
+    outward = bodies.normals[faces].sum(0)
+    for side in (0, 1):
         # past an outer face that is turned away there is nothing but the background, for the ray leaves the convex hull
-        wanted = visible[..., 0, :] & ~looked_at[..., side, :]
-        if (has_background(scene) or not bodies.outer[face]) and wanted.any():
-            past = behind(pictures, points, wanted, edge.faces, outward, fall_off=fall_off)
+        wanted = clear & ~looked_at[..., side, :] & (has_background(scene) | ~bodies.outer[faces[side]])
+        if wanted.any():
+            past = behind(pictures, points, wanted, faces.T, outward, fall_off=fall_off)
             found[..., side, :] = np.where(wanted, past, found[..., side, :])
     return found
 
 
+def _visible_on(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether the sensor sees points (..., n, 3) on edges and a face there, bool (..., n)."""
+    bodies, at = pictures.scene.bodies, pictures.sensor_at
+    fractions = _fractions(pictures.scene.solid, edges, which, points)
+    return _turned_on(bodies, edges, which, at).any(-2) & _seen_on(bodies, edges, which, fractions, at)
+
+
+def _fractions(solid: Solid, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Of the edges' lengths at which points (..., n, 3) lie, (..., n)."""
+    ends = solid.vertices[[edge.ends for edge in edges]]
+    if len(edges) == 1:
+        start, way = ends[0, 0], ends[0, 1] - ends[0, 0]
+        return (points - start) @ way / (way @ way)
+    start, way = ends[which, 0], (ends[:, 1] - ends[:, 0])[which]
+    return np.einsum("...ni,ni->...n", points - start, way) / np.einsum("ni,ni->n", way, way)
+
+
+def _turned_on(bodies: Solid, edges: Sequence[Edge], which: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """`turned` at points on edges, bool (..., 2, n)."""
+    found = np.stack([turned(bodies, edge, at) for edge in edges], -1)
+    return found if len(edges) == 1 else found[..., which]
+
+
+def _seen_on(
+    bodies: Solid, edges: Sequence[Edge], which: np.ndarray, fractions: np.ndarray, at: np.ndarray
+) -> np.ndarray:
+    """`seen` at fractions (..., n) of edges, bool (..., n)."""
+    if len(edges) == 1:
+        return seen(bodies, edges[0], at, fractions)
+    found = np.zeros(np.broadcast_shapes((*at.shape[:-1], 1), fractions.shape), bool)
+    for number, edge in enumerate(edges):
+        here = which == number
+        found[..., here] = seen(bodies, edge, at, fractions[..., here])
+    return found
+
+
 def behind(
-    pictures: Pictures, points: np.ndarray, wanted: np.ndarray, own: tuple[int, ...],
+    pictures: Pictures, points: np.ndarray, wanted: np.ndarray, own: Own,
     outward: np.ndarray | None = None, *, fall_off: bool = True,
 ) -> np.ndarray:  # fmt: skip
     """Signal of what the sensor sees just past points of an edge.
@@ -318,9 +374,9 @@ def behind(
         Scene units.
     wanted : ndarray of bool, shape (..., n)
         For which points; the others get 0.
-    own : tuple of int
+    own : tuple of int, or ndarray of int, shape (n, k)
         Faces that meet in the edge.
-    outward : ndarray, shape (3,), optional
+    outward : ndarray, shape (3,) or (n, 3), optional
         Direction away from the body that the edge belongs to.
 
     Returns
@@ -377,6 +433,8 @@ def _met(bodies, points, vectors, wanted, own) -> tuple[np.ndarray, np.ndarray]:
     asked = asked.any(tuple(i for i, size in enumerate(vectors.shape[:-1]) if size < asked.shape[i]), keepdims=True)
     face, t = np.full(vectors.shape[:-1], -1), np.full(vectors.shape[:-1], np.inf)
     asked = np.broadcast_to(asked, face.shape)
+    if isinstance(own, np.ndarray):
+        own = np.broadcast_to(own, (*face.shape, own.shape[-1]))[asked]
     face[asked], t[asked] = first_face(bodies, np.broadcast_to(points, vectors.shape)[asked], vectors[asked], own)
     return face, t
 

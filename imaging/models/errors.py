@@ -6,6 +6,7 @@ line's displacement at the edge's first end (px) and theta its rotation (rad). `
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,6 +21,8 @@ from imaging.models.form_law import form_variances
 from imaging.pictures import Pictures
 from scenes import Circle, Curved, Quantity
 from scenes.measurands.features import place_of
+
+_AT_ONCE = 64  # pictures times sums of two quantities
 
 LineVariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -108,13 +111,14 @@ class Errors:
         """
         single = np.stack([_variance(self, gradient[..., m, :]) for m in range(gradient.shape[-2])], -1)
         size = np.sqrt(np.where(np.isfinite(single) & (single > 0), single, 1.0))
-        unit = gradient / size[..., None]
+        unit = np.moveaxis(gradient / size[..., None], -2, 0)
         whole = np.empty((*single.shape, single.shape[-1]))
+        step = max(1, _AT_ONCE // max(math.prod(single.shape[:-1]), 1))
         for i in range(single.shape[-1]):
             whole[..., i, i] = single[..., i]
-            for j in range(i):
-                both = _variance(self, unit[..., i, :] + unit[..., j, :])
-                whole[..., i, j] = whole[..., j, i] = (both - 2) / 2 * size[..., i] * size[..., j]
+            for some in (slice(at, min(at + step, i)) for at in range(0, i, step)):
+                both = np.moveaxis(_variance(self, unit[i] + unit[some]), 0, -1)
+                whole[..., i, some] = whole[..., some, i] = (both - 2) / 2 * size[..., i, None] * size[..., some]
         lost = ~np.isfinite(single)
         either = lost[..., :, None] | lost[..., None, :]
         return np.where(either, np.where(np.eye(single.shape[-1], dtype=bool), np.inf, np.nan), whole)
@@ -185,8 +189,11 @@ def _parts(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None) -> tu
         lines, circles = np.where(needed, variance, 0.0), []
         for c, covariance in enumerate(errors.circles):
             pull = known.of_circle(gradient[..., None, :], c)[..., 0, :]
-            moved = np.einsum("...i,...ij,...j->...", pull, covariance, pull)
             needed = (pull != 0).any(-1) if needs is None else needs[edges + c]
+            if not needed.any():
+                circles.append(np.zeros(np.broadcast_shapes(pull.shape[:-1], covariance.shape[:-2])))
+                continue
+            moved = np.einsum("...i,...ij,...j->...", pull, covariance, pull)
             circles.append(np.where(needed, np.where(np.isfinite(moved), moved, np.inf), 0.0))
         for quantity, variance, pull in _forms(errors, gradient):
             name, own = place_of(quantity.features[0]), np.where(pull != 0, pull**2 * variance, 0.0)

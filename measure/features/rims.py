@@ -20,6 +20,7 @@ from imaging.features.rim_sides import clearance, outward_normals, seen_along, w
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
+from measure.estimators.crossing import EachPoint
 from measure.estimators.gradient import gradient_along
 from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
@@ -68,12 +69,11 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.cs
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
-        fit = tool.fit(points.valid)
-        change = tool.solve(fit, points.offset)[0]
-        if not _is_far(tool, change[None])[0]:
+        fit, errors, used = _fitted(tool, points)
+        if not _is_far(tool, errors)[0]:
             break
-        moved = _rounded(tool, np.array(moved) + change)
-    taken = points.valid[0] & (tool.weights > 0)
+        moved = _rounded(tool, np.array(moved) + errors[0])
+    taken = used[0] & (tool.weights > 0)
     return sparse.csr_array(fit[0][:, taken]) @ response[np.flatnonzero(taken)]
 
 
@@ -152,14 +152,26 @@ def _measured(images: Stack | Drawn, tool: RimTool) -> Circles:
     used = images.at(tool.locator.pixels)
     points = tool.locator.locate_each_in(used)
     taken = tool.weights > 0
-    fit = tool.fit(points.valid)
-    errors = tool.solve(fit, points.offset)
+    fit, errors, _ = _fitted(tool, points)
     clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
     part = (points.valid & clear)[:, taken].sum(1) / max(taken.sum(), 1)
     determined = np.isfinite(errors).all(1)
     state = np.where(part >= _MIN_FOUND, tool.state, status.LOW_CONTRAST)
     state = np.where(determined, state, status.ILL_CONDITIONED)
     return Circles(errors, _covariance(used, tool, fit, points), state, determined & (part >= _MIN_NEAR))
+
+
+def _fitted(tool: RimTool, points: EachPoint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Least-squares maps (n, p, m), errors (n, p) and the places (n, m) that they are from: of a circle about where it
+    is expected those that show what is expected of them."""
+    fit = tool.fit(points.valid)
+    errors = tool.solve(fit, points.offset)
+    near = ~_is_far(tool, errors)[:, None]
+    used = np.where(near, tool.as_expected(points.valid, points.contrast), points.valid)
+    if (used != points.valid).any():
+        fit = tool.fit(used)
+        errors = tool.solve(fit, points.offset)
+    return fit, errors, used
 
 
 def _covariance(used: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:
@@ -219,9 +231,10 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
         held(places[keep], optics), (gradient / size[:, None])[keep], size[keep],
         np.stack([along @ one, along @ two], -1)[keep], (design[:, 2] * circle.radius / (2 * speed**2))[keep],
     )  # fmt: skip
+    told = None if seen is None else np.sqrt(seen.squared)[keep]
     signs = None if seen is None else np.where(seen.brightens, 1.0, -1.0)[keep]
     locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain, signs=signs)
-    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve.places, curve)
+    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve.places, curve, told)
 
 
 def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:

@@ -13,6 +13,7 @@ from measure.features.optics import Optics
 
 _NEAR = 1.0  # px: a circle that is farther from where it is expected is looked for again from there
 _PASSES = 3  # what is beside the first order is hundredths of a px, and changes by a part of that
+_EXPECTED = 0.5  # of the share of its expected contrast that a place in the middle shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,8 @@ class RimTool:
         In the recorded image, px.
     curve : Curve, optional
         Of a circle, whose ``inward`` leaves out what depends on where it is found.
+    contrast : ndarray, shape (m,), optional
+        Of a step as steep as the places are expected to show, grey levels; where the light is known.
     """
 
     locator: CrossingLocator
@@ -84,6 +87,23 @@ class RimTool:
     optics: Optics
     places: np.ndarray
     curve: Curve | None = None
+    contrast: np.ndarray | None = None
+
+    def as_expected(self, valid: np.ndarray, contrast: np.ndarray) -> np.ndarray:
+        """Which of the valid places (n, m) show a contrast (n, m) for which their weights were given, bool (n, m).
+
+        Beside a place at which both sides are as bright, the light is not known well enough to tell how little is left,
+        and an error there is many times what its weight allows. All are where most show less: then the light is
+        another one, and the weights are as good as any.
+        """
+        if self.contrast is None:
+            return valid
+        taken = valid & (self.weights > 0)
+        share = np.where(taken, contrast / np.where(self.contrast > 0, self.contrast, np.inf), np.nan)
+        some = taken.any(1)
+        middle = np.full(len(valid), np.nan)
+        middle[some] = np.nanmedian(share[some], 1)
+        return valid & ~(share < _EXPECTED * middle[:, None])
 
     def solve(self, fit: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """The parameters (n, p) by a least-squares map (n, p, m) from offsets (n, m) of the crossings, ideal px.

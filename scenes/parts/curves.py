@@ -7,7 +7,7 @@ import numpy as np
 from scenes.parts.chains import Chains, components, pairs_of
 
 _CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
-_LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
+LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
 _FULL = 0.7  # of the turn before: where a straight edge begins it is half of it, at a last piece all
 _LAST = 1.5  # lengths of the piece before: a last piece
 
@@ -32,7 +32,7 @@ def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
     found = np.zeros(len(shape.bend), bool)
     for k in (0, 1):
         full = curved[:, 1 - k] & (turn >= _FULL * others[pairs[:, 1 - k], 1 - ends[:, 1 - k]])
-        most = np.where(curved[:, k], _LONGER, _LAST * full)
+        most = np.where(curved[:, k], LONGER, _LAST * full)
         rows = turns & ((alike & curved[:, k]) | alone) & (length[:, k] <= most * length[:, 1 - k])
         found[pairs[rows, k]] = True
     return np.isin(run, run[found]) & open_

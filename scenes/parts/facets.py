@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.parts.chains import Chain, Chains, components, pairs_of
-from scenes.parts.curves import curved, meetings, turns_at
+from scenes.parts.cones import chords
+from scenes.parts.curves import LONGER, curved, meetings, turns_at
 from scenes.parts.rims import Rim
 
 _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
@@ -94,7 +95,8 @@ def facets(
     unsure = _unsure(shape, facet)
     within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
     curves |= within | _chords(shape, facet | unsure, smooth)
-    return Facets(region, smooth, curves & ~smooth)
+    curves |= chords(vertices, shape, normals, region, smooth, ~smooth & ~curves)
+    return Facets(region, smooth, _along_lines(shape, curves & ~smooth, ~smooth))
 
 
 def _flush(shape: Chains, pieces: list[list[int]], linked: np.ndarray) -> np.ndarray:
@@ -259,6 +261,19 @@ def _chords(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
     goes_on = rows[turns_at(shape, rows, ends)[2]]
     straight[goes_on] = True
     return ~smooth & ~straight
+
+
+def _along_lines(shape: Chains, curves: np.ndarray, open_: np.ndarray) -> np.ndarray:
+    """Pieces of curved edges, and what continues them in a line where no other edge ends; bool, shape (C,).
+
+    An edge of the part ends where others do: a straight one does not become a curve in between, if it is not much
+    longer than the curve's pieces there, as beside a sliver.
+    """
+    pairs, ends, alone = meetings(shape, open_)
+    run = components(len(shape.bend), pairs[alone & turns_at(shape, pairs, ends)[2]])
+    of_curves = np.bincount(run, shape.length * curves)
+    straight = np.bincount(run, shape.length * (open_ & ~curves))
+    return curves | (straight <= LONGER * of_curves)[run] & open_ & (of_curves > 0)[run]
 
 
 def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:

@@ -76,9 +76,7 @@ def _alike(normals: np.ndarray, region: np.ndarray, one: Chain, other: Chain) ->
     """Whether two pieces lie between the same two surfaces."""
 
     def same(f: int, g: int) -> bool:
-        if region[f] >= 0 or region[g] >= 0:
-            return bool(region[f] == region[g])
-        return bool(np.linalg.norm(normals[f] - normals[g]) <= _FLAT)
+        return bool(region[f] == region[g] >= 0 or np.linalg.norm(normals[f] - normals[g]) <= _FLAT)
 
     (a, b), (c, d) = one[1], other[1]
     return one[2] == other[2] and ((same(a, c) and same(b, d)) or (same(a, d) and same(b, c)))

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import count
+from itertools import count, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -160,20 +160,20 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
         raise InvalidInput("object.file must hold triangles, got none")
     mesh, said = mended(mesh)
     group = _planes(mesh)
-    chains = _straight_chains(mesh.vertices, _pieces(mesh, group))
+    chains = _straight_chains(np.asarray(mesh.vertices), _pieces(mesh, group))
     if not chains:  # nearly flat: all its triangles count as coplanar
         raise InvalidInput("object.file must have faces that meet at an angle, got triangles that are all coplanar")
     normals, areas = _normals(mesh, group)
-    loops = _loops(mesh, group, chains, normals)
-    circular = sorted(rims(loops, mesh.vertices, normals), key=lambda rim: _place(rim.centre, mesh.extents.max()))
+    loops, vertices = _loops(mesh, group, chains, normals), np.asarray(mesh.vertices)  # a mesh tracks its arrays
+    circular = sorted(rims(loops, vertices, normals), key=lambda rim: _place(rim.centre, mesh.extents.max()))
     if told is None:
-        known = facets(mesh.vertices, chains, normals, areas, circular)
+        known = facets(vertices, chains, normals, areas, circular)
     else:
         known = _told(told, mesh, group, chains, circular)
     circular = _edged(circular, chains, known.smooth)
-    whole = joined(mesh.vertices, chains, normals, known.region, known.kinds == "sharp")
+    whole = joined(vertices, chains, normals, known.region, known.kinds == "sharp")
     pieces = [(chain, "sharp") for chain in whole]
-    pieces += [(chain, str(kind)) for chain, kind in zip(chains, known.kinds, strict=True) if kind != "sharp"]
+    pieces += [(chain, kind) for chain, kind in zip(chains, known.kinds.tolist(), strict=True) if kind != "sharp"]
     used = np.unique([end for chain in chains for end in chain[0]])
     plain = _assembled(mesh, group, used, pieces, loops, circular)
     found = replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"], regions=known.region)
@@ -188,9 +188,10 @@ def _edged(circular: list[Rim], chains: list[Chain], smooth: np.ndarray) -> list
 
 def _told(told: Told, mesh: trimesh.Trimesh, group: np.ndarray, chains: list[Chain], circular: list[Rim]) -> Facets:
     """What is told of the chains; pieces of circles are none of straight edges."""
-    beside = {}
-    for (a, b), pair in zip(mesh.face_adjacency_edges.tolist(), mesh.face_adjacency.tolist(), strict=True):
-        faces = tuple(sorted(group[pair].tolist()))
+    beside, between = {}, np.sort(group[mesh.face_adjacency], 1).tolist()
+    for (a, b), pair, faces in zip(
+        mesh.face_adjacency_edges.tolist(), mesh.face_adjacency.tolist(), map(tuple, between), strict=True
+    ):
         beside[a, faces] = beside[b, faces] = pair
     source = mesh.face_attributes["source"]
     sources = source[np.array([beside[ends[0], faces] for ends, faces, _ in chains])]
@@ -208,14 +209,14 @@ def _assembled(mesh, group: np.ndarray, used: np.ndarray, pieces, loops, circula
     number[used] = np.arange(len(used))
     edges = _edges(pieces, number, circular)
     corners = {v for v, many in Counter(end for e in edges if e.kind == "sharp" for end in e.ends).items() if many > 1}
-    names = {"v": count(1), "p": count(1)}
+    names, numbers = {"v": count(1), "p": count(1)}, number.tolist()
     bare = Solid(
         vertex_names=tuple(
             f"{kind}{next(names[kind])}" for kind in ("v" if v in corners else "p" for v in range(len(used)))
         ),
         vertices=np.array(mesh.vertices[used]),
-        faces=tuple(tuple(number[list(face[0])].tolist()) for face in loops),
-        holes=tuple(tuple(tuple(number[list(hole)].tolist()) for hole in face[1:]) for face in loops),
+        faces=tuple(tuple(numbers[v] for v in face[0]) for face in loops),
+        holes=tuple(tuple(tuple(numbers[v] for v in hole) for hole in face[1:]) for face in loops),
         edges=edges,
         triangles=np.array(mesh.triangles),
         triangle_faces=group,
@@ -240,14 +241,15 @@ def _edges(pieces: list[tuple[Chain, str]], number: np.ndarray, circular: list[R
     """The edges in the order of their ends, the sharp ones first."""
     piece = {frozenset(ends): (i, j) for i, rim in enumerate(circular, 1) for j, ends in enumerate(rim.pieces, 1)}
     found: dict[str, list] = {"sharp": [], "rim": [], "smooth": []}
+    numbers = number.tolist()
     for (ends, faces, convex), kind in pieces:
-        here = tuple(sorted(number[list(ends)].tolist()))
+        here = tuple(sorted(numbers[end] for end in ends))
         found[kind].append((here, faces, convex, piece.get(frozenset(ends))))
     edges = []
     for kind, letter in (("sharp", "e"), ("rim", "r"), ("smooth", "s")):
-        numbers = count(1)
+        onward = count(1)
         for ends, faces, convex, at in sorted(found[kind], key=lambda facts: facts[:3]):
-            name = f"c{at[0]}.{at[1]}" if at and kind == "rim" else f"{letter}{next(numbers)}"
+            name = f"c{at[0]}.{at[1]}" if at and kind == "rim" else f"{letter}{next(onward)}"
             edges.append(Edge(name, ends, faces, convex, kind))
     return tuple(edges)
 
@@ -314,14 +316,17 @@ def _in_plane(mesh: trimesh.Trimesh, group: np.ndarray, pairs: np.ndarray) -> np
     np.add.at(middles, group, mesh.triangles_center * mesh.area_faces[:, None])
     middles /= np.bincount(group, mesh.area_faces)[:, None]
     order = np.argsort(group, kind="stable")
-    corners = dict(enumerate(np.split(mesh.triangles[order], np.cumsum(np.bincount(group))[:-1])))
-    sets, largest, kept = DisjointSet(range(len(areas))), np.arange(len(areas)), []
-    for one, other in pairs[np.argsort(-areas[pairs].max(1), kind="stable")]:
-        large, small = sorted((int(largest[sets[each]]) for each in (one, other)), key=lambda number: -areas[number])
+    starts = np.cumsum(np.bincount(group, minlength=len(areas)))[:-1].tolist()
+    whole, parts = np.asarray(mesh.triangles)[order], pairwise([0, *starts, len(group)])
+    corners = {number: whole[first:last] for number, (first, last) in enumerate(parts)}
+    sets, largest, kept = DisjointSet(range(len(areas))), list(range(len(areas))), []
+    unsure, size = 3 * _SINGLE * np.abs(mesh.vertices).max(), areas.tolist()
+    for one, other in pairs[np.argsort(-areas[pairs].max(1), kind="stable")].tolist():
+        large, small = sorted((largest[sets[each]] for each in (one, other)), key=lambda number: -size[number])
         if large == small:
             continue
         away = corners[small] - middles[large]
-        near = 3 * _SINGLE * np.abs(mesh.vertices).max() + _FLAT / 10 * np.linalg.norm(away, axis=-1)
+        near = unsure + _FLAT / 10 * np.sqrt((away**2).sum(-1))
         if (np.abs(away @ normals[large]) <= near).all() and not _folded(corners[small], normals[[large, small]], near):
             sets.merge(large, small)
             largest[sets[large]] = large
@@ -332,10 +337,12 @@ def _in_plane(mesh: trimesh.Trimesh, group: np.ndarray, pairs: np.ndarray) -> np
 
 def _folded(triangles: np.ndarray, normals: np.ndarray, near: np.ndarray) -> bool:
     """Whether triangles (t, 3, 3) look back from the plane that they lie in; a sliver looks anywhere, and does not."""
+    if normals[0] @ normals[1] >= 0:
+        return False
     one, other = (triangles[:, k] - triangles[:, 0] for k in (1, 2))
     area = (np.cross(one, other) @ normals[1]).sum() / 2
     thin = near.max() * np.ptp(triangles.reshape(-1, 3), axis=0).max()
-    return bool(normals[0] @ normals[1] < 0 and area > thin)
+    return bool(area > thin)
 
 
 def _normals(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -347,13 +354,12 @@ def _normals(mesh: trimesh.Trimesh, group: np.ndarray) -> tuple[np.ndarray, np.n
 
 def _pieces(mesh: trimesh.Trimesh, group: np.ndarray) -> dict[tuple[int, int], tuple[tuple[int, int], bool]]:
     """Mesh edges between two faces: ends to (faces, convex)."""
-    pairs = group[mesh.face_adjacency]
+    pairs = np.sort(group[mesh.face_adjacency], 1)
     sharp = pairs[:, 0] != pairs[:, 1]
+    rows = (mesh.face_adjacency_edges[sharp], pairs[sharp], mesh.face_adjacency_convex[sharp])
     return {
-        (int(a), int(b)): (tuple(sorted(map(int, faces))), bool(convex))
-        for (a, b), faces, convex in zip(
-            mesh.face_adjacency_edges[sharp], pairs[sharp], mesh.face_adjacency_convex[sharp], strict=True
-        )
+        tuple(ends): (tuple(faces), convex)
+        for ends, faces, convex in zip(*(each.tolist() for each in rows), strict=True)
     }
 
 
@@ -380,6 +386,8 @@ def _loops(mesh: trimesh.Trimesh, group: np.ndarray, chains: list[Chain], normal
     """Boundaries of each face."""
     kept = np.zeros(len(mesh.vertices), bool)
     kept[[end for chain in chains for end in chain[0]]] = True
-    order = np.argsort(group, kind="stable")
-    parts = np.split(mesh.faces[order], np.cumsum(np.bincount(group))[:-1])
-    return [boundaries(part, kept, mesh.vertices, normal) for part, normal in zip(parts, normals, strict=True)]
+    vertices, there = np.asarray(mesh.vertices), kept.tolist()
+    faces = mesh.faces[np.argsort(group, kind="stable")].tolist()
+    ends = np.cumsum(np.bincount(group)).tolist()
+    parts = (faces[first:last] for first, last in pairwise([0, *ends]))
+    return [boundaries(part, there, vertices, normal) for part, normal in zip(parts, normals, strict=True)]

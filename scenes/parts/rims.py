@@ -27,15 +27,17 @@ class Rim:
         return list(zip(self.loop, self.loop[1:] + self.loop[:1], strict=True))
 
 
-def boundaries(triangles: np.ndarray, kept: np.ndarray, vertices: np.ndarray, normal: np.ndarray) -> list[tuple]:
+def boundaries(
+    triangles: list[list[int]], kept: list[bool], vertices: np.ndarray, normal: np.ndarray
+) -> list[tuple[int, ...]]:
     """Boundaries of a plane face, the outer one first.
 
     Parameters
     ----------
-    triangles : ndarray of int, shape (n, 3)
-        Those that make up the face.
-    kept : ndarray of bool, shape (V,)
-        Vertices that an edge ends in; others lie on straight edges and are left out.
+    triangles : list of list of int
+        Three vertices of each that makes up the face.
+    kept : list of bool
+        Of all V vertices whether an edge ends there; others lie on straight edges and are left out.
     vertices : ndarray, shape (V, 3)
     normal : ndarray, shape (3,)
 
@@ -45,11 +47,11 @@ def boundaries(triangles: np.ndarray, kept: np.ndarray, vertices: np.ndarray, no
         Vertices of each, counter-clockwise around the face.
     """
     if len(triangles) == 1:
-        return [tuple(v for v in triangles[0].tolist() if kept[v])]
-    halves = np.concatenate([triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
-    there = {(a, b) for a, b in halves.tolist()}
+        return [tuple(v for v in triangles[0] if kept[v])]
+    halves = [(each[i], each[k]) for i, k in ((0, 1), (1, 2), (2, 0)) for each in triangles]
+    there = set(halves)
     after: dict[int, list[int]] = {}
-    for a, b in halves.tolist():
+    for a, b in halves:
         if (b, a) not in there:
             after.setdefault(a, []).append(b)
     loops = [tuple(v for v in loop if kept[v]) for loop in _simple(after)]

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _SLIGHT = np.cos(np.radians(6.0))  # facets of a round wall are told from its shading by the third digit
 _MANY = 2000  # vertices, of which those on the convex hull are looked for; faces at a time
+_AT_ONCE = 64  # vertices that are asked whether they stand over faces
 _FLAT = 1e-7  # of the object's size: how far a vertex may stand over a face of a convex solid
 _FOLDED = 1e-9  # of the area of the triangles of a face: area vectors of a face that add up to no more cancel
 
@@ -220,9 +221,14 @@ class Solid:
             from scipy.spatial import ConvexHull  # half a second to load, which a block does not need
 
             corners = corners[ConvexHull(corners).vertices]
-        parts = range(0, len(self.faces), _MANY)
-        highest = [(corners @ self.normals[i : i + _MANY].T).max(0) for i in parts]
-        return np.concatenate(highest) - self.offsets <= _FLAT * self.extent
+        left, parts = np.arange(len(self.faces)), max(1, len(corners) // _AT_ONCE)
+        for part in (corners[k::parts] for k in range(parts)):  # over most faces one of the first few stands
+            some = (left[i : i + _MANY] for i in range(0, len(left), _MANY))
+            highest = [(part @ self.normals[faces].T).max(0) for faces in some]
+            left = left[np.concatenate(highest) - self.offsets[left] <= _FLAT * self.extent] if highest else left
+        found = np.zeros(len(self.faces), bool)
+        found[left] = True
+        return found
 
     @cached_property
     def is_convex(self) -> bool:

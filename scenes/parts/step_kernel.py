@@ -54,7 +54,7 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
             continue  # broken numbers, of which splines may be made for ever
         solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
-            found = _divided(reader, solid, _splined(shape) if done == "splines" else solid, wanted)
+            found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted)
         except Unusable as error:
             found, broken = [], error
         outcomes.append(bool(found))
@@ -62,8 +62,8 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
             break
     if not found:
         raise broken
-    faces, place = _faces(solid), _places(reader)
-    found = [row | {"place": place(face)} for row, face in zip(found, faces, strict=True)]
+    faces, said = _faces(solid), _said(reader)
+    found = [{**row, **said(face)} for row, face in zip(found, faces, strict=True)]
     return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces)}
 
 
@@ -72,30 +72,28 @@ def _faces(shape: Any) -> list[Any]:
     return _parts(_parts([shape], "TopAbs_SOLID", "Solid"), "TopAbs_FACE", "Face")
 
 
-def _divided(reader: Any, shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
+def _divided(shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
     """The faces of a shape, in triangles of so many pieces a turn of what is ``cut``: it, or it as splines."""
     _cut(cut, pieces, controlled=cut is shape)
     every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
     if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
         raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(cut)}")
-    return [
-        {"name": _name(reader, face), **_surface(face), **_triangles(divided)}
-        for face, divided in zip(_faces(shape), _faces(cut), strict=True)
-    ]
+    return [{**_surface(face), **_triangles(divided)} for face, divided in zip(_faces(shape), _faces(cut), strict=True)]
 
 
-def _places(reader: Any) -> Callable[[Any], int]:
-    """Which instance of the file a face is, counted from 0; -1 of one that healing made."""
+def _said(reader: Any) -> Callable[[Any], dict[str, Any]]:
+    """Of a face its name, and which instance of the file it is, counted from 0; -1 of one that healing made."""
     model, transfer = reader.WS().Model(), reader.WS().TransferReader()
     entities = [model.Value(number) for number in range(1, model.NbEntities() + 1)]
     places = {id(entity): place for place, entity in enumerate(entities)}  # each has one object as long as it is kept
 
-    def place(face: Any) -> int:
-        entity = transfer.EntityFromShapeResult(face, 1)
+    def said(face: Any) -> dict[str, Any]:
+        entity = transfer.EntityFromShapeResult(face, 1)  # a search through all that was read
         found = places.get(id(entity), -1)
-        return found if found >= 0 and entities[found] is entity else -1
+        place = found if found >= 0 and entities[found] is entity else -1
+        return {"name": _name_of(entity), "place": place}
 
-    return place
+    return said
 
 
 def _cut(shape: Any, pieces: int, controlled: bool) -> None:
@@ -187,9 +185,12 @@ def _parts(shapes: list[Any], kind: str, cast: str) -> list[Any]:
     return found
 
 
-def _name(reader: Any, face: Any) -> str:
-    """The face's name in the file, empty where it has none."""
-    entity = reader.WS().TransferReader().EntityFromShapeResult(face, 1)
+def _name(reader: Any, shape: Any) -> str:
+    """The name of a shape in the file, empty where it has none."""
+    return _name_of(reader.WS().TransferReader().EntityFromShapeResult(shape, 1))
+
+
+def _name_of(entity: Any) -> str:
     name = entity.Name() if hasattr(entity, "Name") else None
     return name.ToCString() if name is not None else ""
 

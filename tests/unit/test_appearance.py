@@ -14,6 +14,7 @@ from imaging.light.appearance import (
     floor_signal,
     paper_contrast2,
     side_signals,
+    sides_of_one,
     signal,
 )
 from imaging.pictures import Pictures
@@ -134,6 +135,29 @@ def test_side_signals_of_a_crowded_scene(task1, rng, floor):
     assert skipped < 0.05 * 40 * 36
     assert min(kinds["lit"], kinds["shadow"], kinds["hidden"]) > 100
     assert kinds["behind"] > 300
+
+
+@pytest.mark.parametrize(("sensor", "light"), [((40, 290), (30, 240)), ((55, 140), (60, 200))])
+def test_sides_of_many_edges_of_one_picture_are_those_of_each(task1, sensor, light):
+    """At one point of each edge and three of some; of a part with inner edges, with light between its faces."""
+    for scene in (crowded(task1), scenes.load("bracket")):
+        pictures = Pictures.of(scene, sensor, light)
+        edges = scene.solid.sharp
+        which = np.concatenate([np.arange(len(edges)), [0, 0, 3]])
+        fractions = np.linspace(0.1, 0.9, which.size)
+        ends = scene.solid.vertices[[edge.ends for edge in edges]][which]
+        points = ends[:, 0] + fractions[:, None] * (ends[:, 1] - ends[:, 0])
+        found = sides_of_one(pictures, edges, which, points)
+        each = [
+            side_signals(pictures, (edges[number].name,), point[None, None])[0, :, 0]
+            for number, point in zip(which, points, strict=True)
+        ]
+        levels = np.array(each)
+        assert pytest.approx(levels, rel=1e-9, abs=1e-9) == found.T
+        lit = found > 0
+        assert lit.any(0).mean() > 0.3  # margin: some are hidden
+        assert not lit.any(0).all()
+    assert sides_of_one(pictures, (), np.zeros(0, int), np.zeros((0, 3))).shape == (2, 0)
 
 
 def test_the_plain_formula_notices_floor_shadow_and_obstacle(task1):

@@ -10,6 +10,8 @@ import scenes
 from imaging.blurred import boundaries
 from imaging.pictures import Pictures
 from scenes.parts import mesh, rims
+from scenes.parts.chains import SINGLE
+from scenes.parts.cones import Axial
 from scenes.parts.joined import joined
 from scenes.parts.recognised import cylinders
 from scenes.parts.solid import assembled, block
@@ -66,11 +68,15 @@ def test_a_surface_that_bends_both_ways_has_no_edges_inside(steps):
     assert sum(solid.plane) == 5
 
 
-def half_of_a_cone(rows=(0.0, 4.0, 7.0, 10.0), counts=(20, 23, 19, 26)):
-    """Half a cone's trunk, radii 5 below and 3 above, cut through its axis; its facets differ from row to row."""
+def half_of_a_cone(rows=(0.0, 4.0, 7.0, 10.0), counts=(20, 23, 19, 26), aside=0.0):
+    """Half a cone's trunk, radii 5 below and 3 above, cut through its axis; its facets differ from row to row.
+
+    Less than half where it is cut ``aside`` of its axis, in a hyperbola on either side.
+    """
     rings = []
     for z, count in zip(rows, counts, strict=True):
-        angle, radius = np.linspace(0, np.pi, count + 1), 5 - 0.2 * z
+        radius = 5 - 0.2 * z
+        angle = np.linspace(np.arcsin(aside / radius), np.pi - np.arcsin(aside / radius), count + 1)
         rings.append(np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count + 1, z)]))
     triangles = []
     for low, high in pairwise(rings):
@@ -106,6 +112,39 @@ def test_a_straight_edge_of_a_curved_surface_is_one_whatever_divides_it():
     assert len(inner) == 20 + 26  # both half circles
 
 
+@pytest.mark.parametrize(("aside", "straight"), [(0.0, 2), (0.3, 0), (2.0, 0)])
+def test_one_chord_for_a_curve_on_a_cone_is_no_straight_edge(aside, straight):
+    """Through the axis a plane cuts a cone in straight lines, aside of it in curves; below and above are lines."""
+    solid, _ = in_file(half_of_a_cone((0.0, 10.0), (20, 26), aside))
+    ends = [2 * np.sqrt(radius**2 - aside**2) for radius in (3, 5)]
+    # margin: places of a file in single precision
+    assert lengths(solid) == pytest.approx(sorted([*ends, *[np.hypot(10, 2)] * straight]), abs=1e-4)
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.02, 0.3, 2.0])
+def test_a_cone_or_cylinder_through_places_in_single_precision(rng, slope):
+    """50 places on two thirds of a turn; the middles of chords are off it. Too few, or of a plane, tell none."""
+    turn, along = rng.uniform(0, 4, 50), rng.uniform(-1, 1, 50)
+    frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    outward = np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
+    points = (7 + slope * along)[:, None] * outward + along[:, None] * [0, 0, 1.0]
+    normals = (outward - [0, 0, slope]) / np.hypot(1, slope)
+    points, normals = (points @ frame.T + [20.0, -5, 3]).astype(np.float32).astype(float), normals @ frame.T
+    found = Axial.through(points, normals)
+    unsure = 2 * SINGLE * np.abs(points).max()
+    assert np.abs(found.off(points)).max() < unsure / 2
+    assert abs(found.axis @ frame[:, 2]) == pytest.approx(1, abs=1e-9)
+    assert abs(found.slope) == pytest.approx(abs(slope), abs=1e-5)  # margin: of single precision
+    assert found.radius + found.slope * found.axis @ ([20, -5, 3] - found.point) == pytest.approx(7, abs=1e-5)
+    apart = np.arange(50) != np.argsort(turn)[::-1]
+    chords = (points + points[np.argsort(turn)[::-1]])[apart] / 2
+    assert (found.off(chords) < unsure / 2).all()
+    assert np.median(found.off(chords)) < -0.1
+    assert Axial.through(points[:9], normals[:9]) is None
+    flat = np.column_stack([rng.uniform(-1, 1, (30, 2)), np.zeros(30)])
+    assert Axial.through(flat, np.tile([0, 0, 1.0], (30, 1))) is None
+
+
 def test_pieces_are_joined_between_the_same_surfaces_alone():
     """Along x: two pieces of one region, then one of another, then one that turns away."""
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [4, 0, 0], [5, 0.01, 0]])
@@ -117,6 +156,8 @@ def test_pieces_are_joined_between_the_same_surfaces_alone():
     some = joined(vertices, chains, normals, region, np.array([True, False, True, True]))
     assert [sorted(ends) for ends, *_ in some] == [[0, 1], [2, 3], [3, 4]]
     flat = np.array([[0, 0, 1.0], [0, -1, 0], [0, -1, 0], [0, -0.8, 0.6]])
+    facets = joined(vertices, chains, flat, np.array([-1, 5, 6, 7]), np.array([True] * 4))
+    assert [sorted(ends) for ends, *_ in facets] == [[0, 2], [2, 3], [3, 4]]  # in one plane, whatever they are of
     plane = joined(vertices, chains, flat, np.full(4, -1), np.array([True] * 4))
     assert [sorted(ends) for ends, *_ in plane] == [[0, 2], [2, 3], [3, 4]]
 

@@ -5,6 +5,7 @@ import pytest
 
 from scenes.parts.chains import Chains
 from scenes.parts.curves import curved
+from scenes.parts.facets import _along_lines
 
 ARC = [1.0, 1.1, 0.9, 1.0]  # lengths of pieces that turn by 6 degrees
 
@@ -62,3 +63,20 @@ def test_pieces_that_turn_by_60_degrees_are_none_of_a_curve(turn, found):
 
 def test_an_edge_between_planes_is_straight_however_it_turns():
     assert pieces([1.0, 1.2, 1.1], [20.0, 20.0], [-1, -2, -3]) == [False] * 3
+
+
+@pytest.mark.parametrize(
+    ("turn", "others", "length", "found"),
+    [(0.0, (), 1.0, 3), (0.0, (), 3.9, 3), (0.0, (), 4.1, 2), (1.0, (), 1.0, 2), (0.0, (2,), 1.0, 2)],
+)
+def test_what_continues_a_curved_edge_in_a_line_is_a_piece_of_it_up_to_where_others_end(turn, others, length, found):
+    """Two pieces of a curve, then one in their line, one that turns, or one beyond a vertex where another edge ends."""
+    way = np.radians(np.cumsum([0.0, 10.0, turn]))
+    steps = np.stack([np.cos(way), np.sin(way), 0 * way], -1) * np.array([1.0, 1.0, length])[:, None]
+    vertices = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, 0), np.full((1, 3), 9.0)])
+    chains = [((0, 1), (0, 1), True), ((1, 2), (0, 2), True), ((2, 3), (0, 3), True)]
+    chains += [((vertex, 4), (1, 3), True) for vertex in others]
+    shape = Chains.of(vertices, chains, np.tile([0.0, 0, 1], (4, 1)), np.ones(4))
+    curves = np.array([True, True, False] + [False] * len(others))
+    assert _along_lines(shape, curves, np.ones(len(chains), bool)).sum() == found
+    assert not _along_lines(shape, curves, np.arange(len(chains)) != 2)[2]  # a smooth one is none

@@ -39,6 +39,28 @@ def test_embree_names_what_trial_finds(name):
         assert np.isinf(t[face < 0]).all()
 
 
+def test_each_ray_may_have_faces_of_its_own_that_it_does_not_meet(monkeypatch):
+    """As when all rays of those faces are asked together; with a margin too, and without Embree."""
+    body, rng = scenes.load("bracket").bodies, np.random.default_rng(17)
+    origins, vectors = directed(body, rng, 600)
+    own = rng.choice(len(body.faces), (600, 2))
+    some = np.unique(own[:40], axis=0)
+    own[40:] = some[rng.integers(len(some), size=560)]
+    for margin in (0.0, 1e-6):
+        face, t = first_face(body, origins, vectors, own, margin=margin)
+        for faces in some:
+            rows = (own == faces).all(1)
+            expected, at = first_face(body, origins[rows], vectors[rows], tuple(faces.tolist()), margin=margin)
+            assert face[rows].tolist() == expected.tolist()
+            assert t[rows].tolist() == at.tolist()
+    assert (face != first_face(body, origins, vectors, (), margin=1e-6)[0]).any()  # negative control
+    monkeypatch.setattr(rays, "rtcore_scene", None)
+    expected, at = first_face(body, origins, vectors, own)
+    assert (face != expected).sum() <= 1  # margin: a ray may pass an edge within 1e-7 of the size
+    same = face == expected
+    assert t[same] == pytest.approx(at[same], rel=1e-9)
+
+
 def test_a_bundle_tries_what_is_near_and_misses_nothing():
     """Narrow cones of rays at random places of a ball of 20,480 triangles: as when all are tried, of a tenth."""
     ball, rng = trimesh.creation.icosphere(5), np.random.default_rng(3)
