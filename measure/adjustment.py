@@ -14,13 +14,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation, gaussian_gradient_magnitude, label
+from scipy.ndimage import binary_dilation, gaussian_gradient_magnitude, label, uniform_filter
 
 from imaging.sensor import full_scale, recorded
 from scenes import Picture
 
 _SIDE, _MOST = 8, 5000  # px of a block; of blocks: larger ones in larger images
 _LEAST = 9  # blocks of a region
+_NEAR = 5  # blocks a side over which rays scatter alike
 _STEEP = 1.0  # change over a pixel, in the noise's standard deviation, that is an edge's
 _NEAR_END = 4.0  # standard deviations of noise below the end of the scale
 _GROUPS = 1, 2, 4, 8, 16  # blocks a side whose sums tell whether they fit
@@ -94,7 +95,7 @@ class Adjustment:
         levels = (first[:, :1] + second[:, :1]) / 2 - noise.dark_level
         own = _means(deviation[None] ** 2, side)[0, at[:, 0], at[:, 1]] / side**2
         region = regions[tuple(at.T)]
-        own += np.bincount(region, (first[:, 0] - second[:, 0]) ** 2)[region] / np.bincount(region)[region] / 4
+        own += _nearby((first[:, 0] - second[:, 0]) ** 2 / 4, at, regions.shape)
         made = cls(
             side, at, np.concatenate([(first + second)[:, 2:] / 2 - (first + second)[:, 1:2] / 2, levels], 1),
             region, own, np.zeros(0), np.zeros(0), noise.dark_level,
@@ -188,6 +189,14 @@ def _regions(flat: np.ndarray) -> np.ndarray:
     regions, _ = label(flat)
     small = np.bincount(regions.ravel()) < _LEAST
     return np.where(small[regions], 0, regions)
+
+
+def _nearby(values: np.ndarray, at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Means (n,) of values of blocks (n,) over those near each: where faces light each other rays scatter more."""
+    grid, count = np.zeros((2, *shape))
+    grid[tuple(at.T)], count[tuple(at.T)] = values, 1.0
+    sums = (uniform_filter(each, _NEAR, mode="constant")[tuple(at.T)] for each in (grid, count))
+    return np.divide(*sums)
 
 
 def _means(images: np.ndarray, side: int) -> np.ndarray:

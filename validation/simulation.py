@@ -52,6 +52,7 @@ _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that 
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
 _ALIKE = {"samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
 _OVERALL = {"supersample": 1, "samples": 1, "edge_samples": 4, "random_samples": 16}
+_LEVELS = 64  # random samples of the image that a picture is compared with
 _FINE, _COARSE = 4, 2  # fine pixels a pixel, each way, of images that are compared, up to a megapixel and above
 
 
@@ -189,7 +190,8 @@ def _overall(picture: Picture, how: How) -> np.ndarray:
     how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
     for seed in range(2):
         alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
-        sets.append([how.image(picture, seed), *map(alike.image, (picture, *_changed_pictures(picture)))])
+        levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
+        sets.append([levels.image(picture, seed), *map(alike.image, (picture, *_changed_pictures(picture)))])
     return np.array(sets)
 
 
