@@ -16,7 +16,8 @@ from imaging.pictures import Pictures
 from scenes.files.written import edited
 from tests import toleranced
 from tests.commands import ice
-from tests.proofs import form
+from tests.proofs import form, form_poses
+from tests.proofs.kinds import pictures
 from validation.inspection import inspect
 from validation.report.inspection_files import About, records
 
@@ -153,3 +154,14 @@ def test_through_all_commands(tmp_path):
     assert risks["bore"] is None is not risks["mean"]
     plan = json.loads(ice("plan", "plate.toml", "--step", 45, "--no-check", "--json", cwd=tmp_path).stdout)
     assert {each["name"] for each in plan["measurands"]} == {each["name"] for each in asked}
+
+
+def test_forms_at_random_poses(tmp_path):
+    """A reduced proof: one rendered picture, a bore, an edge and the larger of two bores."""
+    scene, rng = form_poses.scene(tmp_path), np.random.default_rng(1)
+    some = ("roundness c2", "straightness e8", "B", "C", "largest")
+    asked = [each.model_dump(exclude_none=True) for each in scene.measurands if each.name in some]
+    (picture,) = pictures(scene.with_(measurands=asked), 1, rng)
+    rows = list(form_poses.rows(picture, 40, rng, 1))
+    assert [row.name for row in rows] == ["roundness c2", "straightness e8", "largest"]
+    assert all(row.is_told(3 * len(rows)) for row in rows), [str(row) for row in rows]
