@@ -105,6 +105,10 @@ class Telecentric(Camera):
         """Radius of the cone of light at the working distance: the numerical aperture's [length]."""
         return self.distance * self.numerical_aperture / math.sqrt(1 - self.numerical_aperture**2)
 
+    def stopped_down(self) -> Self:
+        """The same with an aperture of no size."""
+        return self.model_copy(update={"numerical_aperture": 0.0})
+
     def moved_to(self, distance: float) -> Self:
         """The same camera elsewhere on its axis: the field where it now looks is as large as the lens makes it."""
         moved = self.divisor(self.distance) + self.perspective * (distance - self.distance)
