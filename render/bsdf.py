@@ -38,11 +38,11 @@ class Interaction:
     material: Brdf
     index: tuple[Index, ...]
     sensor: tuple[float, float, float]
-    sensor_share: float
     sensor_angle: float
     lamps: tuple[PolarisedLight, ...] = ()
     analyser: tuple[float, float, float] | None = None
     texture: Face | None = None
+    sensor_share: float = 1.0
 
 
 _surfaces: list[Interaction] = []  # Mitsuba's properties carry numbers only: a BSDF finds its surface by place

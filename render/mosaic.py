@@ -70,14 +70,9 @@ class Tiles:
         """
         view, (top, left) = self.view, self.start
         lens, frame = view["type"] == "thinlens", np.array([view["film"]["height"], view["film"]["width"]])
-        pupils = np.zeros((1, 2)) if self.sight is None else self.sight.pupils(samples)
-        most = (
-            self.sight.widest(_SIDES, roughly=self.roughly)
-            if self.sight is not None
-            else frame.min()
-            if lens
-            else max(_SIDES)
-        )
+        pupils, most = np.zeros((1, 2)), frame.min() if lens else max(_SIDES)
+        if self.sight is not None:
+            pupils, most = self.sight.pupils(samples), self.sight.widest(_SIDES, roughly=self.roughly)
         side = _side(marked, samples, _SENSOR[view["type"]] * len(pupils), most)
         corners, many = side * np.argwhere(_held(marked, side)), max(_AT_ONCE // (side * len(pupils)), 1)
         if lens:  # its crop must lie in the frame
@@ -85,8 +80,9 @@ class Tiles:
         parts = [corners[first : first + many].tolist() for first in range(0, len(corners), many)]
         seeds = np.random.SeedSequence(seed).generate_state(len(parts)).tolist()
         for part, number in zip(parts, seeds, strict=True):
+            placed = () if self.sight is None else (self._placed(self.sight, pupils, side),)
             places = [(y + top, x + left) for y, x in part]
-            sensor = _side_by_side(self.mitsuba, view, places, side, samples // len(pupils), self._placed(pupils, side))
+            sensor = _side_by_side(self.mitsuba, view, places, side, samples // len(pupils), *placed)
             strip = np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=number), float)[:, :, 0]
             strip = strip.reshape(side, len(part), len(pupils), side).mean(2).reshape(side, -1)
             for i, (y, x) in enumerate(part):
@@ -95,11 +91,9 @@ class Tiles:
                 here[:] = strip[above : above + here.shape[0], i * side + before : i * side + before + here.shape[1]]
         return fine
 
-    def _placed(self, pupils: np.ndarray, side: int) -> Placed | None:
+    def _placed(self, sight: Sight, pupils: np.ndarray, side: int) -> Placed:
         """Where each tile's sensors stand of a telecentric camera: one for each place on the aperture."""
-        sight, make = self.sight, self.mitsuba.ScalarTransform4f
-        if sight is None:
-            return None
+        make = self.mitsuba.ScalarTransform4f
         return lambda y, x: [make(sight.to_world((x, y), (side, side), pupil)) for pupil in pupils]
 
 

@@ -27,7 +27,7 @@ class Telecentric(Camera):
     ``distance``; it is no focal length. ``distance`` is the lens' working distance, at which it is focused.
     """
 
-    kind: Literal["telecentric"]
+    kind: Literal["telecentric"]  # ty: ignore[incompatible-attribute-override]
     """telecentric: all chief rays run along the axis."""
     focal_px: Annotated[float, Field(ge=1e-3, le=1e12)]
     """Magnification over the pixel pitch, times ``distance``: follows from the magnification [px]."""
