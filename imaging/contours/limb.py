@@ -195,7 +195,8 @@ def _self_hidden(
     rest = (away**2).sum(-1) + surface.radius**2 - surface.tube**2
     inner = 4 * slope**2 + 2 * rest - 4 * surface.radius**2 * (flat**2).sum(-1)
     others = quadratic_roots(np.ones_like(slope), 2 * slope, inner)
-    before = (others < -_SAME * surface.tube) & (others * eye.share > -far[:, None])
+    begin = far / eye.share if eye.share > 0 else np.full(len(far), np.inf)  # lines of sight, that far away
+    before = (others < -_SAME * surface.tube) & (others > -begin[:, None])
     return before.any(-1) if outwards(surface.hollow) > 0 else np.zeros(len(points), bool)
 
 

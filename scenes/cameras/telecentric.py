@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from scenes.cameras.kinds import CAMERAS
 from scenes.cameras.pinhole import Camera, is_positive
+from scenes.errors import given as told
 from scenes.ranges import NotNegative, Positive
 from scenes.units import Unit, in_unit
 
@@ -69,8 +70,9 @@ class Telecentric(Camera):
         sqrt(2) lambda / (2 pi A) (Zhang, Zerubia and Olivo-Marin 2007, two-dimensional, paraxial).
         """
         magnification, distance = camera.get("magnification"), camera.get("distance")
-        if not (is_positive(magnification) and is_positive(distance)):
-            return {}
+        for key, value in (("magnification", magnification), ("distance", distance)):
+            if not is_positive(value):
+                raise ValueError(f"camera.{key} must be a number greater than 0, got {told(value)}")
         if camera.get("focal_length_mm") is not None:
             raise ValueError("camera.focal_length_mm must be left out with magnification, got it")
         if pitch_um is None:
