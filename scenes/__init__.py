@@ -3,6 +3,7 @@
 from scenes.cameras.lens import Lens
 from scenes.cameras.noise import Noise
 from scenes.cameras.pinhole import Camera
+from scenes.cameras.telecentric import Telecentric
 from scenes.errors import InvalidInput
 from scenes.lights import AnyLight, Backlight, Bar, Disc, Dome, Light, Luminaire, Ring, as_point
 from scenes.lights.filters import Filter, Lamp
@@ -33,6 +34,6 @@ __all__ = [
     "Disc", "Dome", "Edge", "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp",
     "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture",
     "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "StatisticalTexture", "Step", "Task",
-    "Tolerance", "Turned", "Uncertain", "UncertainNumber", "Uncertainty", "Unit", "Wall", "as_point", "block",
-    "find", "load", "mounted", "names", "pairs", "several", "shown",
+    "Telecentric", "Tolerance", "Turned", "Uncertain", "UncertainNumber", "Uncertainty", "Unit", "Wall", "as_point",
+    "block", "find", "load", "mounted", "names", "pairs", "several", "shown",
 ]  # fmt: skip

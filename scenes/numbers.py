@@ -5,15 +5,13 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from scenes.cameras.data_sheet import completed
-
 if TYPE_CHECKING:
+    from scenes.cameras.pinhole import Camera
     from scenes.scene import Scene
 
 ROOTS = ("camera", "light", "lights", "material", "noise", "floor")
 """Tables of a scene whose numbers may be uncertain."""
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
-_SHEET = ("focal_length_mm", "pixel_pitch_um")  # focal_px follows from them
 _TWICE = {"working_distance_mm": "distance"}
 
 
@@ -63,16 +61,24 @@ def with_number(scene: Scene, key: str, value: float) -> Scene:
     >>> round(longer.camera.focal_px / bracket.camera.focal_px, 4)
     1.0109
     """
-    changed = _changed(scene, steps_of(key), value)
     name = key.removeprefix("camera.")
-    if name in _SHEET and changed.camera.focal_length_mm is not None:
-        sheet = changed.camera.model_dump(include={"distance", "pixel_pitch_um", "focal_length_mm"})
-        focal = completed(sheet, scene.units)["focal_px"]
-        return changed.tried(camera=changed.camera.tried(focal_px=focal))
+    if name == "distance":
+        return scene.tried(camera=scene.camera.moved_to(value))
+    changed = _changed(scene, steps_of(key), value)
+    if name in scene.camera.sheet:
+        return changed.tried(camera=_followed(changed))
     if name in _TWICE:
         scale = value / number_at(scene, key)
         return with_number(changed, "camera.distance", scene.camera.distance * scale)
     return changed
+
+
+def _followed(scene: Scene) -> Camera:
+    """The scene's camera with what follows from its data sheet."""
+    camera = scene.camera
+    said = {name: getattr(camera, name) for name in type(camera).model_fields}
+    derived = type(camera).derived(said, scene.units, camera.pixel_pitch_um)
+    return camera.tried(**{name: number for name, (number, _) in derived.items()})
 
 
 def _inner(at: Any, step: str | int) -> Any:

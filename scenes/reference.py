@@ -18,6 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from scenes.cameras.kinds import CAMERAS
 from scenes.model import Model
 from scenes.numbers import ROOTS
 from scenes.scene import Scene
@@ -83,8 +84,9 @@ def _documented() -> dict[str, Any]:
         _plain(model)
         for key, meaning in (_meanings(known[name]) if name in known else {}).items():
             model["properties"][key]["description"] = meaning
-    camera = found["$defs"]["Camera"]
-    camera["required"] = [key for key in camera.get("required", ()) if key not in _FOLLOWING]
+    for kind in CAMERAS:
+        camera = found["$defs"][CAMERAS[kind].__name__]
+        camera["required"] = [key for key in camera.get("required", ()) if key not in _FOLLOWING]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
 
 

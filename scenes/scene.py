@@ -13,10 +13,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
+from scenes.cameras import CAMERAS, LENSES, AnyCamera
 from scenes.cameras.data_sheet import completed
-from scenes.cameras.lens_model import LENSES
 from scenes.cameras.noise import Noise
-from scenes.cameras.pinhole import Camera
 from scenes.changes import changed
 from scenes.errors import InvalidInput
 from scenes.influences import INFLUENCES
@@ -128,7 +127,7 @@ class Scene(Model):
     """Of some faces of the object."""
     textures: tuple[Texture, ...] = ()
     """What is printed on faces, or how unevenly they reflect."""
-    camera: Camera
+    camera: AnyCamera
     """The camera."""
     light: AnyLight | None = None
     """The light, where there is one."""
@@ -447,6 +446,7 @@ class Scene(Model):
             )
 
 
+CAMERAS.followed_by(rebuild)
 INFLUENCES.followed_by(rebuild)
 LENSES.followed_by(rebuild)
 LIGHTS.followed_by(rebuild)

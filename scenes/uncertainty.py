@@ -31,6 +31,7 @@ Deviation = Annotated[
 
 _SAME = {
     "camera.focal_px": ("fx", "fy"), "camera.focal_length_mm": ("fx", "fy"), "camera.pixel_pitch_um": ("fx", "fy"),
+    "camera.magnification": ("fx", "fy"),
     **{f"camera.lens.distortion[{i}]": (name,) for i, name in enumerate(ORDER[4:])},
 }  # fmt: skip
 _WITH_VALUE = ("temperature_K", "expansion_per_K")

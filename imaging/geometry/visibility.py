@@ -1,8 +1,8 @@
 """Which parts of an edge a point in space can see: what the sensor sees, and what the light reaches.
 
-A triangle between a position s and an edge AB hides an interval of it. In the plane through s, A and B a point is
-s + a (A - s) + b (B - s); the ray from s through it meets AB at the fraction b / (a + b), and it lies before the edge
-where 0 < a + b < 1. So the interval is exact, and no ray has to be cast.
+A triangle between a viewpoint (e, s) and an edge AB hides an interval of it. In the plane through both a point is
+A + b (B - A) + c (e - s A); the line of sight through it meets AB at the fraction b / (1 - s c), and it lies before the
+edge where 0 < c and 0 < 1 - s c. So the interval is exact, and no ray has to be cast.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from imaging.geometry.projection import above
 from scenes import Edge, Solid
+from scenes.viewpoint import Viewpoint
 
 _PAIRS = 20_000  # positions times triangles at once that are asked whether they reach the plane of position and edge
 _ROWS = 32  # positions at once of which spans are found
@@ -23,15 +24,15 @@ _KEPT = 100_000  # triangles of a part of which it is kept which turn to a posit
 _BEFORE = 1e-9  # a triangle that touches the edge does not hide it; nothing is seen through a gap of this size
 
 
-def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+def hidden_spans(solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray) -> np.ndarray:
     """Fractions (from, to) of an edge that are hidden from positions.
 
     Parameters
     ----------
     solid : Solid
     edge : Edge
-    positions : ndarray, shape (..., 3)
-        Where the sensor or the light stands, outside the solid.
+    positions : Viewpoint or ndarray, shape (..., 3)
+        From where the sensor looks, or where a light stands, outside the solid.
 
     Returns
     -------
@@ -39,19 +40,22 @@ def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
         Fractions of the edge's length in space, rising and apart from each other; (1, 0) where a position has less than
         K hidden pieces. K is 0 for a convex solid.
     """
+    view = Viewpoint.of(positions)
     if solid.is_convex:
-        return np.empty((*positions.shape[:-1], 0, 2))
-    rows = positions.reshape(-1, 3)
+        return np.empty((*view.shape, 0, 2))
+    rows = view.at.reshape(-1, 3)
     different, which = (rows, np.zeros(1, int)) if len(rows) == 1 else np.unique(rows, axis=0, return_inverse=True)
-    spans = _hidden(solid, edge, different.tobytes())
-    return spans[which].reshape(*positions.shape[:-1], *spans.shape[1:])
+    spans = _hidden(solid, edge, different.tobytes(), view.share)
+    return spans[which].reshape(*view.shape, *spans.shape[1:])
 
 
 @lru_cache(maxsize=128)  # asked for several times of each set of pictures
-def _hidden(solid: Solid, edge: Edge, positions: bytes) -> np.ndarray:
-    """The same for different positions, shape (n, K, 2)."""
+def _hidden(solid: Solid, edge: Edge, positions: bytes, share: float) -> np.ndarray:
+    """The same for different viewpoints, shape (n, K, 2)."""
     rows = np.frombuffer(positions).reshape(-1, 3)
-    parts = [_united(_by_triangle(solid, edge, rows[at : at + _ROWS])) for at in range(0, len(rows), _ROWS)]
+    parts = [
+        _united(_by_triangle(solid, edge, Viewpoint(rows[at : at + _ROWS], share))) for at in range(0, len(rows), _ROWS)
+    ]
     spans = np.empty((len(rows), max((part.shape[-2] for part in parts), default=0), 2))
     spans[:] = 1.0, 0.0
     for part, at in zip(parts, range(0, len(rows), _ROWS), strict=True):
@@ -59,34 +63,35 @@ def _hidden(solid: Solid, edge: Edge, positions: bytes) -> np.ndarray:
     return spans
 
 
-def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
-    """The intervals that triangles hide from positions (n, 3), shape (n, K, 2); (1, 0) for none.
+def _by_triangle(solid: Solid, edge: Edge, view: Viewpoint) -> np.ndarray:
+    """The intervals that triangles hide from viewpoints (n), shape (n, K, 2); (1, 0) for none.
 
     What is hidden from outside is hidden by a triangle that turns to the position: there the ray enters the solid.
     """
-    start, stop = (solid.vertices[end] - positions for end in edge.ends)
-    normal = _cross(start, stop)
+    first, last = (solid.vertices[end] for end in edge.ends)
+    along, away = (last - first)[None], view.towards(first)
+    normal = _cross(along, away)
     with np.errstate(divide="ignore", invalid="ignore"):
         normal = normal / np.einsum("ni,ni->n", normal, normal)[:, None]  # NaN where the edge is seen end-on
     size = max(1, _PAIRS // len(solid.triangles))
-    parts = [_reaching(solid, edge, positions[at : at + size], normal[at : at + size])
-             for at in range(0, len(positions), size)]  # fmt: skip
+    parts = [_reaching(solid, edge, view[at : at + size], normal[at : at + size])
+             for at in range(0, len(normal), size)]  # fmt: skip
     row = np.concatenate([part[0] + k * size for k, part in enumerate(parts)])
     corners, sides = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
-    points = solid.triangle_corners[0][corners] - positions[row, None]
-    a, b = (np.einsum("kci,ki->kc", points, axis[row]) for axis in (_cross(stop, normal), _cross(normal, start)))
-    spans = _merge(*_crossings(a, b, sides))
+    points = solid.triangle_corners[0][corners] - first
+    b, c = (np.einsum("kci,ki->kc", points, axis[row]) for axis in (_cross(away, normal), _cross(normal, along)))
+    spans = _merge(*_crossings(b, c, sides), view.share)
     hides = spans[:, 0] < spans[:, 1]
-    return _in_rows(row[hides], spans[hides], len(positions))
+    return _in_rows(row[hides], spans[hides], len(normal))
 
 
 def _reaching(
-    solid: Solid, edge: Edge, positions: np.ndarray, normal: np.ndarray
+    solid: Solid, edge: Edge, view: Viewpoint, normal: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles that the plane of a position (n, 3) and the edge crosses, K of them: the position's number (K,), their
+    """Triangles that the plane of a viewpoint (n) and the edge crosses, K of them: the viewpoint's number (K,), their
     corners' (K, 3), and how far these lie from the plane of a ``normal`` (n, 3)."""
-    facing, faces = _facing(solid, positions)
-    sides = _coordinates(solid.triangle_corners[0], positions, normal)
+    facing, faces = _facing(solid, view)
+    sides = normal @ (solid.triangle_corners[0] - solid.vertices[edge.ends[0]]).T
     over = sides >= 0
     one, two, three = (over.take(each, -1) for each in facing)
     row, some = np.nonzero((one != two) | (two != three))
@@ -109,23 +114,18 @@ def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return one[:, _ONWARD] * other[:, _BACK] - one[:, _BACK] * other[:, _ONWARD]
 
 
-def _facing(solid: Solid, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles that turn to any of the positions: their corners' numbers (3, T) and their faces (T,)."""
+def _facing(solid: Solid, view: Viewpoint) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that turn to any of the viewpoints: their corners' numbers (3, T) and their faces (T,)."""
     found = _kept_facing if len(solid.triangles) <= _KEPT else _kept_facing.__wrapped__
-    return found(solid, positions.tobytes())
+    return found(solid, view.at.tobytes(), view.share)
 
 
 @lru_cache(maxsize=64)  # asked for of each edge in turn
-def _kept_facing(solid: Solid, positions: bytes) -> tuple[np.ndarray, np.ndarray]:
-    rows = np.frombuffer(positions).reshape(-1, 3)
-    towards = above(rows, solid.normals, solid.offsets).any(0)
+def _kept_facing(solid: Solid, positions: bytes, share: float) -> tuple[np.ndarray, np.ndarray]:
+    view = Viewpoint(np.frombuffer(positions).reshape(-1, 3), share)
+    towards = above(view, solid.normals, solid.offsets).any(0)
     some = np.flatnonzero(towards[solid.triangle_faces])
     return np.ascontiguousarray(solid.triangle_corners[1][some].T), solid.triangle_faces[some]
-
-
-def _coordinates(points: np.ndarray, positions: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Coordinates of points (p, 3) along axes (n, 3) from the positions (n, 3), shape (n, p)."""
-    return axis @ points.T - np.einsum("nj,nj->n", axis, positions)[:, None]
 
 
 def _united(spans: np.ndarray) -> np.ndarray:
@@ -147,22 +147,21 @@ def _united(spans: np.ndarray) -> np.ndarray:
     return found.reshape(*shape, *found.shape[1:])
 
 
-def _crossings(a: np.ndarray, b: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the three sides of each triangle cross the plane: a, b and whether they do, each (..., T, 3)."""
-    onward = [np.roll(values, -1, -1) for values in (a, b, above)]
+def _crossings(b: np.ndarray, c: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the three sides of each triangle cross the plane: b, c and whether they do, each (..., T, 3)."""
+    onward = [np.roll(values, -1, -1) for values in (b, c, above)]
     crosses = (above >= 0) != (onward[2] >= 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         f = np.where(crosses, above / (above - onward[2]), 0.0)
-    return a + f * (onward[0] - a), b + f * (onward[1] - b), crosses
+    return b + f * (onward[0] - b), c + f * (onward[1] - c), crosses
 
 
-def _merge(a: np.ndarray, b: np.ndarray, crosses: np.ndarray) -> np.ndarray:
+def _merge(b: np.ndarray, c: np.ndarray, crosses: np.ndarray, share: float) -> np.ndarray:
     """The hidden interval from the two points in which a triangle's boundary crosses the plane."""
     first = np.argmax(crosses, -1)[..., None]
     last = 2 - np.argmax(crosses[..., ::-1], -1)[..., None]
-    a1, a2, b1, b2 = (np.take_along_axis(v, i, -1)[..., 0] for v in (a, b) for i in (first, last))
-    near, far = a1 + b1, a2 + b2
-    low, high = _BEFORE, 1 - _BEFORE
+    b1, b2, near, far = (np.take_along_axis(v, i, -1)[..., 0] for v in (b, c) for i in (first, last))
+    low, high = _BEFORE, (1 - _BEFORE) / share if share > 0 else np.inf
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = far - near
         enter, leave = (low - near) / slope, (high - near) / slope
@@ -171,13 +170,13 @@ def _merge(a: np.ndarray, b: np.ndarray, crosses: np.ndarray) -> np.ndarray:
         f2 = np.where(flat, 1.0, np.clip(np.maximum(enter, leave), 0, 1))
         middle = near + (f1 + f2) / 2 * slope
         hit = crosses.any(-1) & (f2 > f1) & (middle > low) & (middle < high)
-        t1, t2 = ((b1 + f * (b2 - b1)) / (near + f * slope) for f in (f1, f2))
+        t1, t2 = ((b1 + f * (b2 - b1)) / (1 - share * (near + f * slope)) for f in (f1, f2))
     start, stop = np.fmin(t1, t2), np.fmax(t1, t2)
     hit &= (stop > 0) & (start < 1) & (stop > start)
     return np.stack([np.where(hit, start, 1.0), np.where(hit, stop, 0.0)], -1)
 
 
-def turned(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+def turned(solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray) -> np.ndarray:
     """Which of an edge's two faces the position looks at, just beside the edge; bool, shape (..., 2).
 
     At an inner edge each face hides the other unless both are turned towards the position.
@@ -204,14 +203,14 @@ def boundaries(solid: Solid, edges: Sequence[Edge], faces: np.ndarray) -> np.nda
     return np.where(slight, sides.sum(-1) == 1, sides.any(-1))
 
 
-def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+def seen(solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray, fractions: np.ndarray) -> np.ndarray:
     """Which points of an edge nothing hides from a position, whatever way the edge's own faces turn.
 
     The end of what is hidden is seen: it is asked for, and rounding must not decide what is there.
 
     Parameters
     ----------
-    positions : ndarray, shape (..., 3)
+    positions : Viewpoint or ndarray, shape (..., 3)
     fractions : ndarray, shape (n,) or (..., n)
         Of the edge's length in space.
 
@@ -219,14 +218,15 @@ def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray)
     -------
     ndarray of bool, shape (..., n)
     """
-    shape = np.broadcast_shapes((*positions.shape[:-1], 1), fractions.shape)
+    positions = Viewpoint.of(positions)
+    shape = np.broadcast_shapes((*positions.shape, 1), fractions.shape)
     clear = np.ones(shape, bool)
     for start, stop in np.moveaxis(hidden_spans(solid, edge, positions), (-2, -1), (0, 1)):
         clear &= (fractions <= start[..., None] + _BEFORE) | (fractions >= stop[..., None] - _BEFORE)
     return clear
 
 
-def visible_spans(solid: Solid, edge: Edge, position: np.ndarray) -> list[tuple[float, float]]:
+def visible_spans(solid: Solid, edge: Edge, position: Viewpoint | np.ndarray) -> list[tuple[float, float]]:
     """The parts of an edge that one position sees, as fractions (from, to) of its length in space.
 
     Examples
@@ -246,17 +246,20 @@ def visible_spans(solid: Solid, edge: Edge, position: np.ndarray) -> list[tuple[
     return free + [(at, 1.0)] if at < 1 else free
 
 
-def longest_span(solid: Solid, edge: Edge, positions: np.ndarray, *more: np.ndarray) -> np.ndarray:
+def longest_span(
+    solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray, *more: Viewpoint | np.ndarray
+) -> np.ndarray:
     """The longest part of an edge that nothing hides, (from, to) as fractions of its length in space, shape (..., 2).
 
     ``more`` are further positions (broadcast) from which the part has to be free too: sensor, then light.
     (0, 0) where nothing is left; the way the edge's own faces turn does not matter.
     """
-    shape = np.broadcast_shapes(positions.shape, *(p.shape for p in more))[:-1]
+    views = [Viewpoint.of(each) for each in (positions, *more)]
+    shape = np.broadcast_shapes(*(view.shape for view in views))
     whole = np.broadcast_to(np.array([0.0, 1.0]), (*shape, 2))
     if solid.is_convex:
         return whole
-    spans = [hidden_spans(solid, edge, p) for p in (positions, *more)]
+    spans = [hidden_spans(solid, edge, view) for view in views]
     spans = np.concatenate([np.broadcast_to(s, (*shape, *s.shape[-2:])) for s in spans], -2)
     order = np.argsort(spans[..., 0], -1)[..., None]
     spans = np.take_along_axis(spans, order, -2)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imaging import sensor
-from imaging.geometry.projection import camera_frame, edge_points, facing
+from imaging.geometry.projection import camera_frame, edge_points, facing, ray_origins, rays
 from imaging.geometry.rays import Own, first_face, reaches
 from imaging.geometry.visibility import seen, turned
 from imaging.light.backlight import backlights, backlit
@@ -23,6 +23,7 @@ from imaging.light.irradiance import bands, beam, electric_field, squared_distan
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
 from scenes import Brdf, Edge, Floor, Material, Scene, Solid
+from scenes.viewpoint import Viewpoint
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NEAR = 1e-3  # of the object's size: from the sensor, where a ray begins
@@ -87,7 +88,7 @@ def signal(
         Whether irradiance falls with the squared distance from the light, as it does; eq. 1 has no such term.
     """
     scene, material = pictures.scene, material or pictures.scene.material
-    to_sensor = _unit(widened(pictures.sensor_at, axes) - points)
+    to_sensor = _unit(pictures.viewpoint.widened(axes).towards(points))
     analyser, total = analyser_axis(scene, pictures.sensors), 0.0
     for i, emitter in enumerate(pictures.emitters):
         arriving = beam(emitter, points, axes, fall_off=fall_off)
@@ -201,7 +202,7 @@ def side_signals(
     faces = np.array([edge.faces for edge in edges])
     if is_plain(scene):
         level = face_signal(pictures, points[..., None, :, :], faces[:, :, None], 3, fall_off=fall_off)
-        return np.where(facing(bodies, pictures.sensor_at)[..., faces, None], level, 0.0)
+        return np.where(facing(bodies, pictures.viewpoint)[..., faces, None], level, 0.0)
     return np.stack([_beside(pictures, e, points[..., i, :, :], fall_off) for i, e in enumerate(edges)], -3)
 
 
@@ -274,7 +275,7 @@ def _heights(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
     scene, solid = pictures.scene, pictures.scene.solid
     faces = np.array([solid.edge(name).faces for name in names])
     height = np.maximum(pictures.lights_at[0] @ solid.normals.T - solid.offsets, 0.0)
-    return np.where(facing(solid, pictures.sensor_at), height * whites(scene)[: len(solid.faces)], 0.0)[..., faces]
+    return np.where(facing(solid, pictures.viewpoint), height * whites(scene)[: len(solid.faces)], 0.0)[..., faces]
 
 
 def whites(scene: Scene) -> np.ndarray:
@@ -314,7 +315,7 @@ def _sides(
     )
     level = face_signal(pictures, points[..., None, :, :], faces, 2, lit, fall_off=fall_off)
     level = level + light_between(pictures, points[..., None, :, :], faces)
-    looked_at = _turned_on(bodies, edges, which, pictures.sensor_at)
+    looked_at = _turned_on(bodies, edges, which, pictures.viewpoint)
     found = np.where(clear[..., None, :] & looked_at, level, 0.0)
     outward = bodies.normals[faces].sum(0)
     for side in (0, 1):
@@ -328,7 +329,7 @@ def _sides(
 
 def _visible_on(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Whether the sensor sees points (..., n, 3) on edges and a face there, bool (..., n)."""
-    bodies, at = pictures.scene.bodies, pictures.sensor_at
+    bodies, at = pictures.scene.bodies, pictures.viewpoint
     fractions = _fractions(pictures.scene.solid, edges, which, points)
     return _turned_on(bodies, edges, which, at).any(-2) & _seen_on(bodies, edges, which, fractions, at)
 
@@ -343,19 +344,19 @@ def _fractions(solid: Solid, edges: Sequence[Edge], which: np.ndarray, points: n
     return np.einsum("...ni,ni->...n", points - start, way) / np.einsum("ni,ni->n", way, way)
 
 
-def _turned_on(bodies: Solid, edges: Sequence[Edge], which: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _turned_on(bodies: Solid, edges: Sequence[Edge], which: np.ndarray, at: Viewpoint | np.ndarray) -> np.ndarray:
     """`turned` at points on edges, bool (..., 2, n)."""
     found = np.stack([turned(bodies, edge, at) for edge in edges], -1)
     return found if len(edges) == 1 else found[..., which]
 
 
 def _seen_on(
-    bodies: Solid, edges: Sequence[Edge], which: np.ndarray, fractions: np.ndarray, at: np.ndarray
+    bodies: Solid, edges: Sequence[Edge], which: np.ndarray, fractions: np.ndarray, at: Viewpoint | np.ndarray
 ) -> np.ndarray:
     """`seen` at fractions (..., n) of edges, bool (..., n)."""
     if len(edges) == 1:
         return seen(bodies, edges[0], at, fractions)
-    found = np.zeros(np.broadcast_shapes((*at.shape[:-1], 1), fractions.shape), bool)
+    found = np.zeros(np.broadcast_shapes((*Viewpoint.of(at).shape, 1), fractions.shape), bool)
     for number, edge in enumerate(edges):
         here = which == number
         found[..., here] = seen(bodies, edge, at, fractions[..., here])
@@ -385,7 +386,7 @@ def behind(
         0 where the ray meets nothing, or what it meets is dark.
     """
     scene, bodies = pictures.scene, pictures.scene.bodies
-    vectors = points - widened(pictures.sensor_at, 1)
+    vectors = -pictures.viewpoint.widened().towards(points)
     face, t = _met(bodies, points, vectors, wanted, own)
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
     lit = tuple(_where(wanted & (face >= 0), hit, face, e.at, partial(reaches, bodies)) for e in pictures.emitters)
@@ -402,10 +403,17 @@ def behind(
     return np.where(wanted, found, 0.0)
 
 
-def seen_by_rays(pictures: Pictures, rays: np.ndarray) -> np.ndarray:
-    """Signal of what the sensor of one picture sees along rays (n, 3), shape (n,)."""
-    start = pictures.sensor_at + _NEAR * pictures.scene.solid.extent * _unit(rays)
-    return behind(pictures, start, np.ones(len(rays), bool), ())
+def seen_at(pictures: Pictures, image: np.ndarray) -> np.ndarray:
+    """Signal of what the sensor of one picture sees at image points (n, 2) from the middle, ideal px, shape (n,)."""
+    return seen_by_rays(
+        pictures, *(make(image, pictures.sensors, pictures.scene.camera) for make in (ray_origins, rays))
+    )
+
+
+def seen_by_rays(pictures: Pictures, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """The same along lines of sight from places (n, 3) on."""
+    start = origins + _NEAR * pictures.scene.solid.extent * _unit(vectors)
+    return behind(pictures, start, np.ones(len(vectors), bool), ())
 
 
 def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from typing import Any
 
+from scenes.cameras.kinds import CAMERAS
+from scenes.cameras.pinhole import is_positive as _number
 from scenes.units import Unit, in_unit
 
 _AGREE = 1e-6  # of a value that is said twice
@@ -15,8 +16,8 @@ _SHEET = 0.02  # of a sensor's size: data sheets round it, and count rows that n
 def completed(camera: dict[str, Any], unit: Unit) -> dict[str, Any]:
     """A camera's table with ``width``, ``height``, ``distance`` and ``focal_px`` as its data sheets say.
 
-    The lens is taken to be focused at the distance d: its image then lies f d / (d - f) behind it, not f, and
-    ``focal_px`` is that over the pixel pitch.
+    A pinhole's lens is taken to be focused at the distance d: its image then lies f d / (d - f) behind it, not f, and
+    ``focal_px`` is that over the pixel pitch. Of a telecentric lens it is the magnification over the pitch, times d.
 
     Parameters
     ----------
@@ -41,32 +42,26 @@ def completed(camera: dict[str, Any], unit: Unit) -> dict[str, Any]:
     camera = _with_size(camera, pitch)
     if _number(camera.get("working_distance_mm")):
         camera = _said(camera, "distance", in_unit(camera["working_distance_mm"], "mm", unit), "working_distance_mm")
-    focal, distance = camera.get("focal_length_mm"), camera.get("distance")
-    if not (_number(focal) and _number(distance)):
+    kind = camera.get("kind", "pinhole")
+    if not isinstance(kind, str) or kind not in CAMERAS:
         return camera
-    if pitch is None:
-        raise ValueError("camera.pixel_pitch_um must be given with focal_length_mm, got nothing")
-    away = in_unit(distance, unit, "mm")
-    if not focal < away:
-        raise ValueError(f"camera.focal_length_mm must be less than the distance, {away:g} mm, got {focal:g}")
-    return _said(camera, "focal_px", focal * away / (away - focal) / pitch * 1000, "focal_length_mm")
+    for key, (value, source) in CAMERAS[kind].derived(camera, unit, pitch).items():
+        camera = _said(camera, key, value, source)
+    return camera
 
 
 def not_derived(camera: dict[str, Any], given: Collection[str]) -> dict[str, Any]:
     """A completed camera's table of which some keys are given anew, without what follows from the sheet: it follows
     anew."""
-    follows = set()
-    if camera.get("focal_length_mm") is not None:
-        follows.add("focal_px")
+    kind, follows = camera.get("kind", "pinhole"), set()
+    for key, derived in CAMERAS[kind].follows.items() if isinstance(kind, str) and kind in CAMERAS else ():
+        if camera.get(key) is not None:
+            follows |= set(derived)
     if "working_distance_mm" in given and camera["working_distance_mm"] is not None:
         follows.add("distance")
     if camera.get("sensor_size_mm") is not None and {"sensor_size_mm", "pixel_pitch_um"} & set(given):
         follows |= {"width", "height"}
     return {key: value for key, value in camera.items() if key in given or key not in follows}
-
-
-def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0
 
 
 def _size(camera: dict[str, Any]) -> tuple[float, float] | None:

@@ -1,26 +1,35 @@
-"""The camera."""
+"""The camera: a pinhole, and what every other kind of camera has."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import math
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from scenes.cameras.kinds import CAMERAS
 from scenes.cameras.lens import Lens
 from scenes.cameras.lens_model import AnyLens
 from scenes.model import Model
 from scenes.ranges import Coordinate, Curve, Length, Level, Positive, rising
+from scenes.units import Unit, in_unit
 
 MOST_PIXELS = 40_000_000  # 320 MB as float64
 
 
+@CAMERAS.add("pinhole")
 class Camera(Model):
     """A pinhole camera on a sphere around ``look_at``, which it looks at, z axis up.
 
     Instead of ``width`` and ``height``, ``distance`` and ``focal_px`` a scene may say ``sensor_size_mm``,
     ``working_distance_mm``, and ``focal_length_mm`` with ``pixel_pitch_um`` (`scenes.cameras.data_sheet.completed`).
+
+    What lies beside the axis by b at the depth z is seen at ``focal_px`` b / ((1 - s) ``distance`` + s z) px from the
+    image's middle, s the share of perspective (`perspective`): 1 of a pinhole.
     """
 
+    kind: Literal["pinhole"] = "pinhole"
+    """pinhole: all rays go through one point."""
     width: Annotated[int, Field(ge=1, le=16384)]
     """Width of the image [px]."""
     height: Annotated[int, Field(ge=1, le=16384)]
@@ -68,7 +77,59 @@ class Camera(Model):
         """Width and height of what it sees at its distance, in the scene's unit."""
         return tuple(self.distance / self.focal_px * pixels for pixels in (self.width, self.height))
 
+    follows: ClassVar[dict[str, tuple[str, ...]]] = {"focal_length_mm": ("focal_px",)}
+    """Keys that follow from a data sheet's key where that is said."""
+    sheet: ClassVar[tuple[str, ...]] = ("focal_length_mm", "pixel_pitch_um")
+    """The data sheet's numbers that others follow from, beside lengths of the scene."""
+
+    @classmethod
+    def derived(cls, camera: dict[str, Any], unit: Unit, pitch_um: float | None) -> dict[str, tuple[float, str]]:
+        """What follows from a camera's table, as data sheets say it: values by their keys, and from which key.
+
+        Raises
+        ------
+        ValueError
+            If it does not fit together, or is not enough.
+        """
+        focal, distance = camera.get("focal_length_mm"), camera.get("distance")
+        if not (is_positive(focal) and is_positive(distance)):
+            return {}
+        if pitch_um is None:
+            raise ValueError("camera.pixel_pitch_um must be given with focal_length_mm, got nothing")
+        away = in_unit(distance, unit, "mm")
+        if not focal < away:
+            raise ValueError(f"camera.focal_length_mm must be less than the distance, {away:g} mm, got {focal:g}")
+        return {"focal_px": (focal * away / (away - focal) / pitch_um * 1000, "focal_length_mm")}
+
+    @property
+    def perspective(self) -> float:
+        """Share of perspective: 1 where all rays go through one point, 0 where they are parallel."""
+        return 1.0
+
+    @property
+    def aperture_radius(self) -> float:
+        """Radius of the cone of light that a point in focus sends through the lens, at ``distance`` [length]."""
+        return self.lens.aperture_radius
+
+    def stopped_down(self) -> Self:
+        """The same with an aperture of no size."""
+        return self.model_copy(update={"lens": self.lens.model_copy(update={"aperture_radius": 0.0})})
+
+    def divisor(self, depth: Any) -> Any:
+        """What ``focal_px`` is divided by for the px of a unit length at a depth along the axis, scene units."""
+        share = self.perspective
+        return (1 - share) * self.distance + share * depth
+
+    def moved_to(self, distance: float) -> Self:
+        """The same camera elsewhere on its axis, its lens set as before; unchecked."""
+        return self.tried(distance=distance)
+
     @field_validator("transmission", "responsivity")
     @classmethod
     def _in_order(cls, rows: tuple, info: ValidationInfo) -> tuple:
         return rising(f"camera.{info.field_name}", rows)
+
+
+def is_positive(value: Any) -> bool:
+    """Whether a key says a positive, finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0
