@@ -257,7 +257,7 @@ def _in_one(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, fracti
     """The same of one picture, all edges at once: levels (P, 2) of the sides of edges, ``which`` (P,)."""
     vertices, alone = pictures.scene.solid.vertices, pictures.at(*_of_each(pictures, 0))
     ends = vertices[np.array([edge.ends for edge in edges], int).reshape(-1, 2)]
-    near, far = np.moveaxis(depth(ends, alone.sensors, pictures.scene.camera)[which], 1, 0)
+    near, far = np.moveaxis(divisor(ends, alone.sensors, pictures.scene.camera)[which], 1, 0)
     spatial = fractions * near / (far + fractions * (near - far))
     start, stop = np.moveaxis(ends[which], 1, 0)
     return sides_of_one(alone, edges, which, start + spatial[:, None] * (stop - start)).T
