@@ -47,8 +47,8 @@ class Adjustment:
     variance : ndarray, shape (n,)
         Of the means by noise.
     normal, spread : ndarray, shape (k, k)
-        What the products of blocks and columns are on the mean, times the errors of inputs, and their covariance by noise:
-        the same, but for the noise of rays in the columns, which is no information.
+        Products of blocks and columns are the former times the inputs' errors, on the mean, and have the latter as their
+        covariance: the same, but for the noise of rays in the columns, which is no information.
     dark : float
         Level without light.
     """
