@@ -47,7 +47,7 @@ class Adjustment:
     variance : ndarray, shape (n,)
         Of the means by noise.
     normal, spread : ndarray, shape (k, k)
-        Products of blocks and columns are the former times the inputs' errors, on the mean, and have the latter as their
+        Products of blocks and columns are the former times the inputs' errors, on the mean, with the latter as their
         covariance: the same, but for the noise of rays in the columns, which is no information.
     dark : float
         Level without light.
