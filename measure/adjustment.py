@@ -4,8 +4,8 @@ A face beside a wall that reflects more is brighter near its foot, one under a l
 otherwise. Means of square blocks of pixels that show no edge, less those of the simulated picture, are adjusted by
 least squares: the inputs' standard uncertainties are observations beside them (Mikhail and Ackermann, Observations and
 Least Squares, 1976). The brightness of each region that edges bound is free: no two faces of a part reflect quite
-alike. Where blocks do not fit, whatever is wrong counts as noise of theirs: as much as it makes sums of neighbouring
-blocks scatter more than noise does, for it goes together over faces.
+alike. Where blocks of a region do not fit, whatever is wrong counts as noise of theirs: as much as it makes sums of
+neighbouring blocks scatter more than noise does, for it goes together over faces.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ from imaging.sensor import full_scale, recorded
 from scenes import Picture
 
 _SIDE, _MOST = 8, 5000  # px of a block; of blocks: larger ones in larger images
+_OF_RAYS = 1.5  # of one image's variance by rays: of two on the mean, and of a picture that is a render
 _LEAST = 9  # blocks of a region
 _NEAR = 5  # blocks a side over which rays scatter alike
 _STEEP = 1.0  # change over a pixel, in the noise's standard deviation, that is an edge's
 _NEAR_END = 4.0  # standard deviations of noise below the end of the scale
 _GROUPS = 1, 2, 4, 8, 16  # blocks a side whose sums tell whether they fit
 _ENOUGH = 4  # sums for each input, to tell it
-_CHANCE = 3.0  # standard deviations of products of noise, which are no information
+_TIMES = 3  # that regions' misfits are found anew
+_CHANCE = 5.0  # standard deviations of products of noise, which are no information
 _LINEAR = 0.1  # of what a standard uncertainty does, that is not told by a multiple of it
 
 
@@ -46,9 +48,9 @@ class Adjustment:
         Which region of the image each is in.
     variance : ndarray, shape (n,)
         Of the means by noise.
-    normal, spread : ndarray, shape (k, k)
-        Products of blocks and columns are the former times the inputs' errors, on the mean, with the latter as their
-        covariance: the same, but for the noise of rays in the columns, which is no information.
+    normal, spread : ndarray, shape (R, k, k)
+        Of each region. Products of blocks and columns are the former times the inputs' errors, on the mean, with the
+        latter as their covariance: the same, but for the noise of rays in the columns, which is no information.
     dark : float
         Level without light.
     """
@@ -95,21 +97,26 @@ class Adjustment:
         levels = (first[:, :1] + second[:, :1]) / 2 - noise.dark_level
         own = _means(deviation[None] ** 2, side)[0, at[:, 0], at[:, 1]] / side**2
         region = regions[tuple(at.T)]
-        own += _nearby((first[:, 0] - second[:, 0]) ** 2 / 4, at, regions.shape)
+        own += _OF_RAYS * _nearby((first[:, 0] - second[:, 0]) ** 2 / 2, at, region, regions.shape)
         made = cls(
             side, at, np.concatenate([(first + second)[:, 2:] / 2 - (first + second)[:, 1:2] / 2, levels], 1),
             region, own, np.zeros(0), np.zeros(0), noise.dark_level,
         )  # fmt: skip
         one, other = (made._left(each[:, 2:] - each[:, 1:2]) for each in (first, second))
-        by_chance = _CHANCE / math.sqrt(len(at)) * (one - other).T @ (one - other) / 2
-        both = (one + other) / 2
-        return replace(made, normal=_definite(one.T @ other - by_chance), spread=both.T @ both)
+        told = [_products(one[region == each], other[region == each]) for each in made.regions]
+        normal, spread = (np.array(each) for each in zip(*told, strict=True))
+        return replace(made, normal=normal, spread=spread)
+
+    @property
+    def regions(self) -> np.ndarray:
+        """Their numbers, (R,)."""
+        return np.unique(self.region)
 
     def _left(self, told: np.ndarray) -> np.ndarray:
         """What of changes (n, m) each region's brightness does not explain, in standard deviations of noise."""
         weight = 1 / np.sqrt(self.variance)
         told, level = told * weight[:, None], self.columns[:, -1] * weight
-        for region in np.unique(self.region):
+        for region in self.regions:
             some = self.region == region
             bright = level[some] / max(float(np.linalg.norm(level[some])), np.finfo(float).tiny)  # or dark all over
             told[some] -= np.outer(bright, bright @ told[some])
@@ -118,35 +125,48 @@ class Adjustment:
     @property
     def covariance(self) -> np.ndarray:
         """Of the inputs (k, k) once a picture is seen that is as its scene says but for them."""
-        return self._covariance(1.0)
-
-    def _covariance(self, misfit: float) -> np.ndarray:
-        inputs = np.eye(len(self.normal))
-        return (1 - _LINEAR**2) * (inputs - self._gain(misfit) @ self.normal) + _LINEAR**2 * inputs
-
-    def _gain(self, misfit: float) -> np.ndarray:
-        """What the products of blocks and columns are multiplied with, so that the inputs' mean squares are least."""
-        spread = self.normal @ self.normal + misfit * self.spread
-        return self.normal @ np.linalg.inv(spread + np.finfo(float).eps * np.eye(len(spread)))
+        return self._solved(np.ones(len(self.normal)))[1]
 
     def inputs(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Errors of the inputs (k,) that a picture (height, width) shows, and their covariance (k, k)."""
         seen = _means(image[None], self.side)[0, self.at[:, 0], self.at[:, 1]] - self.dark
         left = self._left(np.concatenate([(seen - self.columns[:, -1])[:, None], self.columns[:, :-1]], 1))
-        off, columns = left[:, 0], left[:, 1:]
-        misfit = self._misfit(off - columns @ (self._gain(1.0) @ (columns.T @ off)))
-        return self._gain(misfit) @ (columns.T @ off), self._covariance(misfit)
+        off, columns, misfit = left[:, 0], left[:, 1:], np.ones(len(self.normal))
+        products = np.array([columns[self.region == r].T @ off[self.region == r] for r in self.regions])
+        for _ in range(_TIMES):
+            gain, covariance = self._solved(misfit)
+            found = gain @ (products / misfit[:, None]).sum(0)
+            misfit = self._misfit(off - columns @ found)
+        return found, covariance
 
-    def _misfit(self, left: np.ndarray) -> float:
-        """By how much more what is left (n,), in its standard deviations, scatters than noise, as a variance; 1 at
-        least."""
-        free, most = self.columns.shape[1] - 1 + len(np.unique(self.region)), 1.0
-        for size in _GROUPS:
-            _, group = np.unique(self.at // size, axis=0, return_inverse=True)
-            sums, counts = np.bincount(group.ravel(), left), np.bincount(group.ravel())
-            if len(sums) >= 2 * free:
-                most = max(most, float((sums**2 / counts).sum() / (len(sums) - free)))
-        return most
+    def _solved(self, misfit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the sum of products over misfits (R,) is multiplied with, so that the inputs' errors are least, and their
+        covariance."""
+        normal, spread = ((each / misfit[:, None, None]).sum(0) for each in (self.normal, self.spread))
+        inputs = np.eye(len(normal))
+        gain = normal @ np.linalg.inv(normal @ normal + spread + np.finfo(float).eps * inputs)
+        return gain, (1 - _LINEAR**2) * (inputs - gain @ normal) + _LINEAR**2 * inputs
+
+    def _misfit(self, left: np.ndarray) -> np.ndarray:
+        """By how much more what is left (n,), in its standard deviations, scatters in each region than noise, as a
+        variance (R,); 1 at least."""
+        found, inputs = np.ones(len(self.normal)), self.columns.shape[1] - 1
+        for k, region in enumerate(self.regions):
+            some = self.region == region
+            free = 1 + inputs * some.mean()
+            for size in _GROUPS:
+                _, group = np.unique(self.at[some] // size, axis=0, return_inverse=True)
+                sums, counts = np.bincount(group.ravel(), left[some]), np.bincount(group.ravel())
+                if len(sums) >= 2 * free:
+                    found[k] = max(found[k], float((sums**2 / counts).sum() / (len(sums) - free)))
+        return found
+
+
+def _products(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Information, and its noise, (k, k) each, of columns (n, k) from two sets of rays."""
+    by_chance = _CHANCE / math.sqrt(len(one)) * (one - other).T @ (one - other) / 2
+    both = (one + other) / 2
+    return _definite(one.T @ other - by_chance), both.T @ both
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,12 +211,17 @@ def _regions(flat: np.ndarray) -> np.ndarray:
     return np.where(small[regions], 0, regions)
 
 
-def _nearby(values: np.ndarray, at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Means (n,) of values of blocks (n,) over those near each: where faces light each other rays scatter more."""
-    grid, count = np.zeros((2, *shape))
-    grid[tuple(at.T)], count[tuple(at.T)] = values, 1.0
-    sums = (uniform_filter(each, _NEAR, mode="constant")[tuple(at.T)] for each in (grid, count))
-    return np.divide(*sums)
+def _nearby(values: np.ndarray, at: np.ndarray, region: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Means (n,) of values of blocks (n,) over those near each in its region: where faces light each other rays scatter
+    more."""
+    found = np.empty(len(values))
+    for each in np.unique(region):
+        some = region == each
+        grid, count = np.zeros((2, *shape))
+        grid[tuple(at[some].T)], count[tuple(at[some].T)] = values[some], 1.0
+        sums, counts = (uniform_filter(image, _NEAR, mode="constant")[tuple(at[some].T)] for image in (grid, count))
+        found[some] = sums / counts
+    return found
 
 
 def _means(images: np.ndarray, side: int) -> np.ndarray:

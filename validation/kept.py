@@ -48,8 +48,8 @@ class _Adjusted(BaseModel):
     columns: list[list[float]]
     region: list[int]
     variance: list[Annotated[float, Field(gt=0)]]
-    normal: list[list[float]]
-    spread: list[list[float]]
+    normal: list[list[list[float]]]
+    spread: list[list[list[float]]]
     dark: float
     names: list[Annotated[str, Field(max_length=40)]]
     moved: list[_Numbers]
@@ -60,9 +60,10 @@ class _Adjusted(BaseModel):
         n, k = len(self.at), len(self.names)
         values = *self.moved, *self.moved_image
         whole = len(self.columns) == len(self.region) == len(self.variance) == n
-        whole &= len(self.normal) == len(self.spread) == len(self.moved) == len(self.moved_image) == k
-        whole &= all(len(row) == k + 1 for row in self.columns)
-        whole &= all(len(row) == k for row in (*self.normal, *self.spread))
+        squares = *self.normal, *self.spread
+        whole &= len(self.moved) == len(self.moved_image) == k and len(squares) == 2 * len(set(self.region))
+        whole &= all(len(row) == k + 1 for row in self.columns) and len(self.normal) == len(self.spread)
+        whole &= all(len(square) == k and all(len(row) == k for row in square) for square in squares)
         whole &= all(len(row) == count for row in values)
         if not whole:
             return None
