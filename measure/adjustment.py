@@ -140,7 +140,7 @@ class Adjustment:
         return found, covariance
 
     def _solved(self, misfit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the sum of products over misfits (R,) is multiplied with, so that the inputs' errors are least, and their
+        """What the sum of products over misfits (R,) is multiplied with, so that inputs err least, and their
         covariance."""
         normal, spread = ((each / misfit[:, None, None]).sum(0) for each in (self.normal, self.spread))
         inputs = np.eye(len(normal))
