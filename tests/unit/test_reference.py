@@ -43,9 +43,7 @@ def test_the_schema_knows_uncertain_numbers():
 def unknown(document, schema, whole, path=""):
     """Keys of a document that the schema does not know, and required ones that the document lacks."""
     if isinstance(document, dict) and "oneOf" in schema:
-        kinds = [(of_kind(part, whole), part) for part in schema["oneOf"]]
-        if all(kind for kind, _ in kinds):
-            schema = next((part for kind, part in kinds if kind == document.get("kind")), kinds[0][1])
+        schema = next((part for part in schema["oneOf"] if is_meant(document, part, whole)), schema)
     if "$ref" in schema:
         schema = whole["$defs"][schema["$ref"].rsplit("/", 1)[-1]]
     if isinstance(document, dict) and "properties" in schema:
@@ -58,9 +56,11 @@ def unknown(document, schema, whole, path=""):
             yield from unknown(item, schema["items"], whole, f"{path}[{i}]")
 
 
-def of_kind(part, whole):
-    """The name of a kind that a reference stands for; None of one that has no name."""
-    return whole["$defs"][part["$ref"].rsplit("/", 1)[-1]]["properties"].get("kind", {}).get("const")
+def is_meant(document, part, whole):
+    """Whether a table is of the kind that a reference stands for, by its name or as what is meant without one."""
+    model = whole["$defs"][part["$ref"].rsplit("/", 1)[-1]]
+    kind = model["properties"].get("kind", {})
+    return "const" in kind and document.get("kind", kind.get("default")) == kind["const"]
 
 
 @pytest.mark.parametrize("name", scenes.names())
