@@ -9,11 +9,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from imaging.geometry.projection import light_position, sensor_position
+from imaging.geometry.projection import light_position, sensor_position, viewpoint
 from imaging.light.emitters import Emitter, emitters
 from scenes import InvalidInput, Picture, Scene, mounted
 from scenes.arrays import poses
 from scenes.lights import FULL, GLANCE
+from scenes.viewpoint import Viewpoint
 
 T = TypeVar("T")
 
@@ -73,6 +74,11 @@ class Pictures:
     def sensor_at(self) -> np.ndarray:
         """Where the sensors stand, scene units, shape (..., 3)."""
         return self.once("sensor_at", lambda: sensor_position(self.scene.camera, self.sensors))
+
+    @property
+    def viewpoint(self) -> Viewpoint:
+        """From where the sensors look."""
+        return self.once("viewpoint", lambda: viewpoint(self.scene.camera, self.sensors))
 
     @property
     def lights_at(self) -> tuple[np.ndarray, ...]:

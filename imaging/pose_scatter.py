@@ -68,7 +68,7 @@ def _both(here: Measurands, there: Measurands) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _with_circles(here: Measurands, there: Measurands, found: Seen) -> Seen:
-    """What is found, circles too: their centres sought along the rays, their radii by the depth."""
+    """What is found, circles too: their centres sought along the rays, their radii by the scale there."""
     if not found.circles:
         return found
     centres, radii, angles = [], [], []
@@ -76,12 +76,13 @@ def _with_circles(here: Measurands, there: Measurands, found: Seen) -> Seen:
         centre, each = here.seen.centres[..., c, :], found.solid.round(name)
         feature = Wall(surface=name) if isinstance(each, Curved) else Centre(circle=name)
         image = there.seen.point(feature, None)
-        sight = centre - here.seen.eye if isinstance(each, Curved) else np.broadcast_to(each.axis, centre.shape)
+        towards = here.seen.viewpoint.towards(centre)
+        sight = -towards if isinstance(each, Curved) else np.broadcast_to(each.axis, centre.shape)
         plane = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
         seen = found.onto(image, plane, each.centre).at
-        depths = there.seen.depth(there.seen.centres[..., c, :]), found.depth(seen)
+        over = there.seen.divisor(there.seen.centres[..., c, :]), found.divisor(seen)
         centres.append(seen)
-        radii.append(found.radii[..., c] * depths[1] / depths[0])
+        radii.append(found.radii[..., c] * over[1] / over[0])
         angles.append(_half_angle(here.seen, there.seen, each))
     return replace(found, centres=np.stack(centres, -2), radii=np.stack(radii, -1), half_angles=np.stack(angles, -1))
 
@@ -95,6 +96,6 @@ def _half_angle(here: Seen, there: Seen, each: Circle | Curved) -> np.ndarray:
         return np.zeros(there.eye.shape[:-1])
     sines = []
     for seen in (here, there):
-        sight = each.centre - seen.eye
+        sight = -seen.viewpoint.towards(each.centre)
         sines.append(np.linalg.norm(np.cross(sight, each.surface.axis), axis=-1) / np.linalg.norm(sight, axis=-1))
     return np.arcsin(np.clip(np.sin(each.half_angle) * sines[0] / sines[1], -1, 1))

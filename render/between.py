@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from imaging.geometry.looked_at import looked_at
-from imaging.geometry.projection import facing, project_ideal, sensor_position
+from imaging.geometry.projection import facing, project_ideal, viewpoint
 from scenes import Picture
 
 _UP = 1 - 1e-9  # cosine to the vertical
@@ -69,7 +69,7 @@ def _crossed(
 ) -> np.ndarray:
     """Which fine pixels the edges of such faces (F,) that look at the sensor may cross, hidden or not."""
     bodies, camera, sensor = picture.scene.bodies, picture.scene.camera, np.array(list(picture.sensor))
-    seen = lent & facing(bodies, sensor_position(camera, sensor))
+    seen = lent & facing(bodies, viewpoint(camera, sensor))
     edges = [edge.ends for edge in bodies.edges if seen[list(edge.faces)].any()]
     found = np.zeros(shape, np.uint8)
     if not edges:

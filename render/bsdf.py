@@ -30,7 +30,8 @@ class Interaction:
 
     ``analyser`` is what the polariser before the sensor at ``sensor`` passes; None without one. Light between two
     surfaces counts as unpolarised; lamps and sensor are known by their directions, within the angles that they span,
-    the sensor within ``sensor_angle`` (rad).
+    the sensor within ``sensor_angle`` (rad); sensor and its share of perspective are those of a
+    `scenes.viewpoint.Viewpoint`.
     ``texture`` has factors of the diffuse reflectance.
     """
 
@@ -41,6 +42,7 @@ class Interaction:
     lamps: tuple[PolarisedLight, ...] = ()
     analyser: tuple[float, float, float] | None = None
     texture: Face | None = None
+    sensor_share: float = 1.0
 
 
 _surfaces: list[Interaction] = []  # Mitsuba's properties carry numbers only: a BSDF finds its surface by place
@@ -83,7 +85,7 @@ def _register(variant: str) -> None:
         def eval(self, ctx, si, wo, active=True):
             known = self.surface
             analyser = None if known.analyser is None else _local(si, known.analyser, si.wi)
-            to_sensor = _along(dr, mi, si, known.sensor, si.wi, known.sensor_angle)
+            to_sensor = _along(dr, mi, si, known.sensor, si.wi, known.sensor_angle, known.sensor_share)
             factor = 1.0 if self.texture is None else self.texture.eval_1(si, active)
             value = self._seen(wo, si.wi, None, analyser, to_sensor, factor)
             for lamp in known.lamps:
@@ -126,7 +128,7 @@ def _register(variant: str) -> None:
     mi.register_bsdf(NAME, lambda props: Reflecting(props))
 
 
-def _along(dr, mi, si, position, way, angle: float):
+def _along(dr, mi, si, position, way, angle: float, share: float = 1.0):
     """Whether a way in the surface's frame leads to a place in space, within an angle."""
-    towards = si.to_local(dr.normalize(mi.Point3f(*position) - si.p))
+    towards = si.to_local(dr.normalize(mi.Point3f(*position) - share * si.p))
     return dr.dot(towards, way) > math.cos(angle) - _ROUNDING

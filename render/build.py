@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from imaging.geometry.projection import camera_frame
+from imaging.geometry.projection import camera_frame, viewpoint
 from imaging.light.appearance import analyser_axis
 from imaging.light.irradiance import bands
 from imaging.light.sheets import sheets
@@ -16,6 +16,7 @@ from render.curved import curved_shapes, stands_for
 from render.meshes import mesh
 from render.parts import Part
 from render.rays import SURFACES
+from render.sight import Sight
 from render.texture import Face, bitmap, faces, shapes, texels, uneven_part
 from scenes import Brdf, Floor, Picture, Scene, Solid
 from scenes.lights.luminaire import BLACK
@@ -73,7 +74,7 @@ def description(
 def aperture_radius(scene: Scene, active: frozenset[str]) -> float:
     """Radius of the aperture as it is simulated, scene units."""
     least = _TINY_APERTURE * scene.camera.distance
-    return max(scene.camera.lens.aperture_radius, least) if "depth_of_field" in active else 0.0
+    return max(scene.camera.aperture_radius, least) if "depth_of_field" in active else 0.0
 
 
 def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...], ...] | None:
@@ -136,13 +137,15 @@ def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Brdf, 
         if part is not None:
             return {"type": "diffuse", "reflectance": bitmap(mitsuba, material.diffuse() * part.values)}
         return {"type": "diffuse", "reflectance": {"type": "spectrum", "value": material.diffuse()}}
-    analyser = analyser_axis(scene, np.array(list(picture.sensor))) if "analyser" in active else None
+    pose = np.array(list(picture.sensor))
+    eye, analyser = viewpoint(scene.camera, pose), analyser_axis(scene, pose) if "analyser" in active else None
     return bsdf.describe(
         mitsuba,
         bsdf.Interaction(
             material,
             bands(scene, material=material if "wavelength" in active else material.with_dispersion(())),
-            tuple(scene.position("sensor", picture.sensor).tolist()),
+            tuple(eye.at.tolist()),
+            sensor_share=eye.share,
             sensor_angle=2 * aperture_radius(scene, active) / scene.camera.distance,
             lamps=lights.lamps(picture, active),
             analyser=None if analyser is None else tuple(analyser.tolist()),
@@ -157,22 +160,32 @@ def view(mitsuba, picture: Picture, active, size, crop, samples: int) -> dict:
     camera, axes = scene.camera, camera_frame(scene.camera, np.array(list(sensor)))
     position = scene.position("sensor", sensor)
     rows, columns = crop
-    lens = {"type": "perspective"}
-    if "depth_of_field" in active:
+    lens: dict[str, Any] = {"type": "perspective"}
+    sight = Sight.of(picture, active, size[0] // camera.width)
+    if sight is not None:
+        lens = {"type": "orthographic"}
+    elif "depth_of_field" in active:
         lens = {
             "type": "thinlens",
             "aperture_radius": aperture_radius(scene, active),
             "focus_distance": camera.lens.focus or camera.distance,
         }
+    if sight is not None:
+        seen = sight.described((0, 0), size)
+        placed = {**seen, "to_world": mitsuba.ScalarTransform4f(seen["to_world"])}
+    else:
+        placed = {
+            "fov_axis": "x",
+            "fov": 2 * math.degrees(math.atan(camera.width / 2 / camera.focal_px)),
+            "near_clip": 1e-3 * camera.distance,
+            "far_clip": 1e3 * camera.distance,
+            "to_world": mitsuba.ScalarTransform4f().look_at(
+                origin=position.tolist(), target=list(camera.look_at), up=(-axes.down).tolist()
+            ),  # single precision: a target beside the sensor would turn the image by 0.001 px
+        }
     return {
         **lens,
-        "fov_axis": "x",
-        "fov": 2 * math.degrees(math.atan(camera.width / 2 / camera.focal_px)),
-        "near_clip": 1e-3 * camera.distance,
-        "far_clip": 1e3 * camera.distance,
-        "to_world": mitsuba.ScalarTransform4f().look_at(
-            origin=position.tolist(), target=list(camera.look_at), up=(-axes.down).tolist()
-        ),  # single precision: a target beside the sensor would turn the image by 0.001 px
+        **placed,
         "film": {
             "type": "hdrfilm",
             "width": size[0],

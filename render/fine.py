@@ -7,7 +7,8 @@ random (interreflection, an aperture, a light of some size), all that something 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -25,6 +26,7 @@ from render.mosaic import Tiles
 from render.parts import Part
 from render.quality import Quality
 from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
+from render.sight import Sight
 from render.surroundings import near_edges
 from render.texture import Face
 from scenes import Picture
@@ -162,7 +164,15 @@ class _Tracer:
         bounces = SURFACES - 1 if "interreflection" in self.active else 0
         at_once = LARGE_AT_ONCE if self.is_large else AT_ONCE
         most, quality = max(self.few, self.many), self.quality
-        return Rays(self.mitsuba, quality.supersample, most, bounces, quality.seed, at_once, self.part.silhouette)
+        return Rays(
+            self.mitsuba, quality.supersample, most, bounces, quality.seed, at_once, self.part.silhouette, self._sighted
+        )
+
+    @cached_property
+    def _sighted(self) -> Callable[[tuple[int, int], Any, Any], Any] | None:
+        """Rays of a telecentric camera."""
+        sight = Sight.of(self.picture, self.active, self.quality.supersample)
+        return None if sight is None else lambda shape, place, pair: sight.rays(self.mitsuba, place, self.crop, pair)
 
     def film(self, divided: int = 1) -> tuple[tuple[int, int], tuple[slice, slice]]:
         """Width and height of the whole frame, and the crop, in pixels of so many fine ones each way."""
@@ -175,9 +185,17 @@ class _Tracer:
         made = description(self.mitsuba, part, *self.film(divided), samples, textures)
         return self.mitsuba.load_dict(made, parallel=False)
 
-    def rendered(self, loaded: Any) -> np.ndarray:
+    def rendered(self, loaded: Any, active, rays: int, divided: int = 1) -> np.ndarray:
         """Image of all its pixels."""
-        return np.array(self.mitsuba.render(loaded, seed=self.quality.seed), dtype=float)[:, :, 0]
+        sight = Sight.of(self.picture, active, self.quality.supersample // divided)
+        if sight is None or sight.is_parallel:
+            return np.array(self.mitsuba.render(loaded, seed=self.quality.seed), dtype=float)[:, :, 0]
+        pixels = np.zeros(tuple(part.stop - part.start for part in self.film(divided)[1]))
+        everywhere = np.ones(pixels.shape, bool)
+        if not self.scalar:
+            return refine(loaded, self.rays, pixels, everywhere, rays)
+        tiles = replace(self._tiles(loaded, active, rays, divided), roughly=True)
+        return tiles.rendered(pixels, everywhere, rays, (self.quality.seed, 3))
 
     def again(self, loaded: Any, active, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
         """The image with marked fine pixels rendered again; in scalar variants also what turns out to be crossed."""
@@ -191,30 +209,31 @@ class _Tracer:
             return refine(loaded, self.rays, fine, marked, rays)
         return self._tiles(loaded, active, rays).rendered(fine, marked, rays, (self.quality.seed, 0))
 
-    def _tiles(self, loaded: Any, active, rays: int) -> Tiles:
+    def _tiles(self, loaded: Any, active, rays: int, divided: int = 1, sampler: str = "multijitter") -> Tiles:
         """Of fine pixels, in scalar variants."""
-        seen = view(self.mitsuba, self.picture, active, *self.film(), rays)
-        seen["sampler"] = {"type": "stratified", "jitter": False} if self.quality.alike else {"type": "multijitter"}
-        return Tiles(self.mitsuba, loaded, seen, self.start)
+        size, crop = self.film(divided)
+        seen = view(self.mitsuba, self.picture, active, size, crop, rays) | {"sampler": {"type": sampler}}
+        if self.quality.alike and divided == 1:
+            seen["sampler"] = {"type": "stratified", "jitter": False}
+        sight = Sight.of(self.picture, active, self.quality.supersample // divided)
+        return Tiles(self.mitsuba, loaded, seen, (crop[0].start, crop[1].start), sight)
 
     def whole(self, random: bool, count: int) -> np.ndarray:
         """Image of whole pixels, with or without random rays."""
         active, textures = (self.active, None) if random else (self.sharp, self.textures)
         loaded = self.load(active, count, textures, self.quality.supersample)
         if self.scalar:
-            return self.rendered(loaded)
+            return self.rendered(loaded, active, count, self.quality.supersample)
         pixels = np.zeros(tuple(part.stop - part.start for part in self.film(self.quality.supersample)[1]))
         return refine(loaded, self.rays, pixels, np.ones(pixels.shape, bool), count)
 
     def bounced(self, near: np.ndarray, count: int) -> np.ndarray:
         """What surfaces send to each other: with it less without it, of the same rays; whole pixels."""
         pixels, count = np.zeros(near.shape), 1 << math.ceil(math.log2(count))
-        film = self.film(self.quality.supersample)
 
         def with_effects(active) -> np.ndarray:
             loaded = self.load(active, count, None, self.quality.supersample)
-            seen = view(self.mitsuba, self.picture, active, *film, count) | {"sampler": {"type": "ldsampler"}}
-            tiles = Tiles(self.mitsuba, loaded, seen, (film[1][0].start, film[1][1].start))
+            tiles = self._tiles(loaded, active, count, self.quality.supersample, "ldsampler")
             return tiles.rendered(pixels.copy(), near, count, (self.quality.seed, 2))
 
         return with_effects(self.active) - with_effects(self.sharp)
@@ -244,13 +263,16 @@ class _Tracer:
     def small(self) -> np.ndarray:
         """Image of which all fine pixels are rendered, and those near edges again."""
         loaded = self.load(self.sharp, self.ordinary, self.textures)
-        fine = self.rendered(loaded)
+        fine = self.rendered(loaded, self.sharp, self.ordinary)
         marked = self._crossed(fine)
         if not self.random:
             return self.again(loaded, self.active, fine, marked, self.many)
         loaded, near = self.load(self.active, self.few), near_edges(self.picture, self.crop, self.quality.supersample)
         everywhere = np.ones_like(marked)
-        fine = self.rendered(loaded) if self.scalar else refine(loaded, self.rays, fine, everywhere, self.few)
+        if self.scalar:
+            fine = self.rendered(loaded, self.active, self.few)
+        else:
+            fine = refine(loaded, self.rays, fine, everywhere, self.few)
         if self.quiet:
             fine = self.again(loaded, self.active, fine, near & ~marked, min(_NEAR, self.many))
         else:
@@ -264,7 +286,7 @@ class _Tracer:
         if scene.textures:
             bare = self.picture.with_scene(scene.model_copy(update={"textures": ()}))
             plain = textured(bare, self.sharp) if self.textures is not None else None
-            even = self.rendered(self.load(self.sharp, 1, plain, shown=bare))
+            even = self.rendered(self.load(self.sharp, 1, plain, shown=bare), self.sharp, 1)
         marked = crossed(even, away)
         if scene.solid.curved and not away:
             marked &= bent(even)  # their shading slopes more than a plane face's

@@ -7,15 +7,19 @@ call of the renderer takes as long as a thousand rays, making a sensor as long a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from render.adaptive import MISSED, crossed
+from render.sight import Sight
 
 _SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels: each twice the one before
-_SENSOR = {"perspective": 20, "thinlens": 200}  # rays that take as long as making a sensor
+_SENSOR = {"perspective": 20, "orthographic": 20, "thinlens": 200}  # rays that take as long as making a sensor
+Placed: TypeAlias = Callable[[int, int], list[Any]]  # a tile's row and column to transforms of sensors that look at it
+
 _AT_ONCE = 1024  # fine pixels along a film: single precision knows places on it to 1e-4 of one
 
 
@@ -32,12 +36,18 @@ class Tiles:
         Description of the sensor, its sampler among it.
     start : tuple of int
         Row and column in the sensor's whole frame of the first pixel of an image.
+    sight : Sight, optional
+        Of a telecentric camera.
+    roughly : bool
+        Whether its tiles may be large.
     """
 
     mitsuba: Any
     scene: Any
     view: dict
     start: tuple[int, int]
+    sight: Sight | None = None
+    roughly: bool = False
 
     def refined(self, fine: np.ndarray, marked: np.ndarray, samples: int, seed: int) -> np.ndarray:
         """As `rendered`, and then those pixels again that turn out to be crossed as well."""
@@ -60,20 +70,31 @@ class Tiles:
         """
         view, (top, left) = self.view, self.start
         lens, frame = view["type"] == "thinlens", np.array([view["film"]["height"], view["film"]["width"]])
-        side = _side(marked, samples, _SENSOR[view["type"]], frame.min() if lens else max(_SIDES))
-        corners, many = side * np.argwhere(_held(marked, side)), _AT_ONCE // side
+        pupils, most = np.zeros((1, 2)), frame.min() if lens else max(_SIDES)
+        if self.sight is not None:
+            pupils, most = self.sight.pupils(samples), self.sight.widest(_SIDES, roughly=self.roughly)
+        side = _side(marked, samples, _SENSOR[view["type"]] * len(pupils), most)
+        corners, many = side * np.argwhere(_held(marked, side)), max(_AT_ONCE // (side * len(pupils)), 1)
         if lens:  # its crop must lie in the frame
             corners = np.minimum(corners, frame - self.start - side)
         parts = [corners[first : first + many].tolist() for first in range(0, len(corners), many)]
         seeds = np.random.SeedSequence(seed).generate_state(len(parts)).tolist()
         for part, number in zip(parts, seeds, strict=True):
-            sensor = _side_by_side(self.mitsuba, view, [(y + top, x + left) for y, x in part], side, samples)
+            placed = () if self.sight is None else (self._placed(self.sight, pupils, side),)
+            places = [(y + top, x + left) for y, x in part]
+            sensor = _side_by_side(self.mitsuba, view, places, side, samples // len(pupils), *placed)
             strip = np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=number), float)[:, :, 0]
+            strip = strip.reshape(side, len(part), len(pupils), side).mean(2).reshape(side, -1)
             for i, (y, x) in enumerate(part):
                 above, before = max(-y, 0), max(-x, 0)  # of the tile, outside the image
                 here = fine[y + above : y + side, x + before : x + side]
                 here[:] = strip[above : above + here.shape[0], i * side + before : i * side + before + here.shape[1]]
         return fine
+
+    def _placed(self, sight: Sight, pupils: np.ndarray, side: int) -> Placed:
+        """Where each tile's sensors stand of a telecentric camera: one for each place on the aperture."""
+        make = self.mitsuba.ScalarTransform4f
+        return lambda y, x: [make(sight.to_world((x, y), (side, side), pupil)) for pupil in pupils]
 
 
 def _held(marked: np.ndarray, side: int) -> np.ndarray:
@@ -103,18 +124,29 @@ def _side(marked: np.ndarray, samples: int, sensor: int, most: int) -> int:
     return min((side for side in _SIDES if side <= most), key=taken.__getitem__)
 
 
-def _side_by_side(mitsuba: Any, view: dict, corners: list[tuple[int, int]], side: int, samples: int) -> Any:
-    """One sensor whose film holds the tiles of the whole frame at some corners (row, column) from left to right."""
+def _side_by_side(
+    mitsuba: Any, view: dict, corners: list[tuple[int, int]], side: int, samples: int, placed: Placed | None = None
+) -> Any:
+    """One sensor whose film holds the tiles of the whole frame at some corners (row, column) from left to right.
+
+    Where ``placed`` says where several sensors look at a tile, their images stand beside each other.
+    """
     make, frame = mitsuba.PluginManager.instance().create_object, view["film"]
     film = {key: value for key, value in frame.items() if not key.startswith("crop")}
     row = mitsuba.Properties("batch")
-    row["film"] = mitsuba.load_dict({**film, "width": side * len(corners), "height": side})
+    views = [None for _ in corners] if placed is None else [way for corner in corners for way in placed(*corner)]
+    row["film"] = mitsuba.load_dict({**film, "width": side * len(views), "height": side})
     row["sampler"] = mitsuba.load_dict({**view["sampler"], "sample_count": samples})
     one = mitsuba.Properties(view["type"])
     for key in view.keys() - {"type", "film", "sampler"}:
         one[key] = view[key]
     one["sampler"], one["film"] = row["sampler"], mitsuba.load_dict({**film, "width": side, "height": side})
     lens, sensors = view["type"] == "thinlens", []
+    for i, way in enumerate(views if placed is not None else ()):
+        one["to_world"] = way
+        row[f"tile{i:04}"] = make(one)
+    if placed is not None:
+        return make(row)
     if not lens:
         one["fov"] = 2 * math.degrees(math.atan(math.tan(math.radians(view["fov"] / 2)) * side / frame["width"]))
     for i, (y, x) in enumerate(corners):

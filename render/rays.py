@@ -9,6 +9,7 @@ an edge and all along it, and in two renders of the same seed that differ in an 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -40,6 +41,8 @@ class Rays:
         Rays in one call, which bounds the memory.
     shown : bool
         Whether a light itself is seen, and nothing else.
+    sight : callable, optional
+        (rows and columns of the crop's size, places, random numbers) to rays, where no sensor of Mitsuba has them.
     """
 
     mitsuba: Any
@@ -49,6 +52,7 @@ class Rays:
     seed: int
     at_once: int = AT_ONCE
     shown: bool = False
+    sight: Callable[[tuple[int, int], Any, Any], Any] | None = None
 
     def radiance(
         self, scene: Any, rows: np.ndarray, columns: np.ndarray, shape: tuple[int, int], samples: int
@@ -94,8 +98,11 @@ class Rays:
             (x + (mi.Float(stratum % side) + jitter.x) / side) / shape[1],
             (y + (mi.Float(stratum // side) + jitter.y) / side) / shape[0],
         )
-        ray, weight = scene.sensors()[0].sample_ray(0.0, 0.5, place, self._pair(point, 0))
-        radiance = weight[0] * self._follow(scene, ray, point)
+        if self.sight is None:
+            ray, weight = scene.sensors()[0].sample_ray(0.0, 0.5, place, self._pair(point, 0))
+            radiance = weight[0] * self._follow(scene, ray, point)
+        else:
+            radiance = self._follow(scene, self.sight(shape, place, self._pair(point, 0)), point)
         return np.array(dr.block_sum(radiance, samples), float) / samples
 
     def _follow(self, scene, ray, point):

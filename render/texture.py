@@ -30,6 +30,7 @@ from render.meshes import mesh
 from scenes import Brdf, Picture, Scene, Solid, as_point
 from scenes.lights import SMOOTH
 from scenes.materials.textures import Rectangle
+from scenes.viewpoint import Viewpoint
 
 Points = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -86,7 +87,7 @@ def faces(
     above = np.array([_over(solid, emitter.at) for emitter in pictures.emitters]).reshape(-1, len(solid.normals))
     small = is_point(pictures.scene.lights)
     lit = _over(solid, pictures.lights_at[0], _GRAZING if small else _LOW)
-    seen = _over(solid, pictures.sensor_at)
+    seen = _over(solid, pictures.viewpoint)
     if (above.any(0) & ~lit & seen).any() and not small:
         return None  # lit from the rim of a light whose middle is below the horizon
     for index in np.flatnonzero(lit & seen):
@@ -101,9 +102,10 @@ def faces(
     return (*found, Face(rest, np.zeros((*rest.shape[:2], 2)), np.zeros((2, 2))))
 
 
-def _over(solid: Solid, place: np.ndarray, sine: float = _GRAZING) -> np.ndarray:
+def _over(solid: Solid, place: Viewpoint | np.ndarray, sine: float = _GRAZING) -> np.ndarray:
     """Which faces a place is over by more than a part of its distance from the origin, bool (F,)."""
-    return solid.normals @ place - solid.offsets > sine * np.linalg.norm(place)
+    view = Viewpoint.of(place)
+    return view.height(solid.normals, solid.offsets) > sine * np.linalg.norm(view.at)
 
 
 def shapes(mitsuba: Any, parts: tuple[Face, ...]) -> list[Any]:
@@ -204,7 +206,7 @@ def _excess(values: np.ndarray) -> float:
 
 def _slope(points: np.ndarray, normal: np.ndarray, pictures: Pictures) -> np.ndarray:
     """Tangent of the angle by which a facet that mirrors the light to the sensor is tilted, as a vector in the face."""
-    half = sum(_towards(place, points) for place in (pictures.lights_at[0], pictures.sensor_at))
+    half = sum(_towards(place, points) for place in (Viewpoint(pictures.lights_at[0]), pictures.viewpoint))
     return half / (half @ normal)[..., None] - normal
 
 
@@ -232,7 +234,7 @@ def pointed(scene: Scene) -> Scene:
     return scene.lit_by(as_point(scene.lights[0]))
 
 
-def _towards(place: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Unit vectors from points to a place."""
-    away = place - points
+def _towards(view: Viewpoint, points: np.ndarray) -> np.ndarray:
+    """Unit vectors from points to a place, or along lines of sight."""
+    away = view.towards(points)
     return away / np.linalg.norm(away, axis=-1, keepdims=True)

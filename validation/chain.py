@@ -19,7 +19,7 @@ from measure import best_estimator
 from measure.believed import believed
 from planner.budgeting.budgets import SceneBudget
 from planner.budgeting.station import Station
-from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE
+from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE, TOGETHER
 from planner.uncertainty.groups import draw
 from validation.stations import exposed
 
@@ -114,10 +114,13 @@ class Chain:
         return np.array([np.sqrt(np.mean(o**2)) / b.u for o, b in zip(off, self.budget.measurands, strict=True)])
 
     def added(self, m: int, drawn: dict[str, np.ndarray], *, pictured: bool = False) -> np.ndarray:
-        """What drawn terms add to the m-th value, (n,); without those that a picture has in itself."""
+        """What drawn terms add to the m-th value, (n,); without those that a picture has in itself.
+
+        What inputs do together is in the inputs' own second order.
+        """
         total, by_name = np.zeros(1), {term.name: term for term in self.budget.terms[m]}
         for name, term in by_name.items():
-            if name not in (TEMPERATURE, EXPANSION) and not (
+            if name not in (TEMPERATURE, EXPANSION, TOGETHER) and not (
                 pictured and (name in _IN_A_PICTURE or name.startswith(BIAS))
             ):
                 total = total + term.sensitivity * (drawn[name] - term.value)

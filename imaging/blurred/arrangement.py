@@ -175,7 +175,7 @@ def _arrangement(pictures: Pictures) -> Arrangement:
         raise NotImplementedError("arrangement of scenes in which things hide or shade each other")
     camera = scene.camera
     image = project_ideal(solid.vertices, pose, camera)
-    seen = facing(solid, pictures.sensor_at)
+    seen = facing(solid, pictures.viewpoint)
     regions, place = [Region.flat(np.zeros((1, 2)), 0)], {}
     for face in np.flatnonzero(seen):
         region = _region(pictures, solid, int(face))
@@ -203,7 +203,7 @@ def _arrangement(pictures: Pictures) -> Arrangement:
         required=np.array([edge.ends if i in drawn else (-1, -1) for i, edge in enumerate(required)]),
         edges=np.array(owners, int),
         corners=np.array(vertices, int),
-        camera=camera if camera.lens.bends or camera.lens.aperture_radius > 0 else None,
+        camera=camera if camera.lens.bends or camera.aperture_radius > 0 else None,
         blur_px=camera.blur_px,
     )
 

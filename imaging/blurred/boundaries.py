@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from imaging.blurred.segment import Segments
-from imaging.geometry.projection import camera_frame, depth, edge_points, facing, from_axis
+from imaging.geometry.projection import camera_frame, divisor, edge_points, facing, from_axis
 from imaging.geometry.visibility import boundaries
 from imaging.geometry.visibility import seen as visible_at
 from imaging.light.appearance import face_signal, is_plain, side_signals
@@ -127,7 +127,7 @@ def _pairs(pictures: Pictures, places: Places, far: float) -> tuple[np.ndarray, 
     lengths = ((last - first) * t).sum(-1)
     along = [end[..., 0] * t[..., 0] + end[..., 1] * t[..., 1] for end in ends]
     across = [end[..., 1] * t[..., 0] - end[..., 0] * t[..., 1] for end in ends]
-    seen = boundaries(bodies, bodies.edges, facing(bodies, pictures.sensor_at))[:, None]
+    seen = boundaries(bodies, bodies.edges, facing(bodies, pictures.viewpoint))[:, None]
     beside = (np.minimum(*across) < far) & (np.maximum(*across) > -far)
     reached = (np.maximum(*along) > places.fractions.min(-1)[..., None] * lengths - far) & (
         np.minimum(*along) < places.fractions.max(-1)[..., None] * lengths + far
@@ -158,7 +158,7 @@ def _sides(pictures: Pictures, places: Places, at: tuple[np.ndarray, ...], other
     """Levels (P, 2) on both sides of edges ``other`` and their gradients (P, 2, 2) in the axes of the places ``at``."""
     solid, (picture, edge, which) = pictures.scene.solid, at
     faces = sided(solid)[other]
-    seen = facing(solid, pictures.sensor_at)[picture[:, None], faces]
+    seen = facing(solid, pictures.viewpoint)[picture[:, None], faces]
     found = np.zeros((*faces.shape, 3))
     for side in (0, 1):
         rows = seen[:, side]
@@ -190,19 +190,20 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     """
     solid, camera = pictures.scene.solid, pictures.scene.camera
     of_each = pictures.at(*_of_each(pictures, picture))
-    at, axes = of_each.sensor_at[:, None], camera_frame(camera, of_each.sensors)
+    axes = camera_frame(camera, of_each.sensors)
     ends = np.array([solid.edge(name).ends for name in names])
-    near, far = (depth(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1))
+    near, far = (divisor(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1))
     spatial = _SUPPORT * near / (far + _SUPPORT * (near - far))
     start, stop = (solid.vertices[ends[edge, k]][:, None] for k in (0, 1))
     points = start + spatial[..., None] * (stop - start)
     pixel = (near + spatial * (far - near))[..., None] / camera.focal_px
     steps = np.stack([0 * points, *(_STEP * pixel * axis[:, None] for axis in (axes.right, axes.down))], -2)
-    rays = points[..., None, :] + steps - at[..., None, :]
+    places = points[..., None, :] + steps
+    rays = -of_each.viewpoint.widened(2).towards(places)
     normal = solid.normals[face][:, None, None]
-    heights = solid.offsets[face] - (of_each.sensor_at * normal[:, 0, 0]).sum(-1)
+    heights = solid.offsets[face][:, None, None] - (places * normal).sum(-1)
     with np.errstate(all="ignore"):
-        met = at[..., None, :] + (heights[:, None, None] / (rays * normal).sum(-1))[..., None] * rays
+        met = places + (heights / (rays * normal).sum(-1))[..., None] * rays
         values = face_signal(of_each, met, face[:, None, None], 2, prints=False) + light_between(
             of_each, met, face[:, None, None]
         )
@@ -251,13 +252,15 @@ def _shown(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: 
     for which in np.unique(other):
         edge, rows = bodies.edges[which], np.flatnonzero(other == which)
         spatial = _in_space(pictures, bodies, edge, picture[rows], nearest[rows])
-        found[rows] = visible_at(bodies, edge, pictures.sensor_at[picture[rows]], spatial[:, None])[:, 0]
+        found[rows] = visible_at(bodies, edge, pictures.viewpoint[picture[rows]], spatial[:, None])[:, 0]
     return found
 
 
 def _in_space(pictures: Pictures, solid: Solid, edge: Edge, picture: np.ndarray, fractions: np.ndarray) -> np.ndarray:
     """Fractions (P,) of an edge's length in space from those of its image's."""
-    near, far = (depth(solid.vertices[[end]], pictures.sensors, pictures.scene.camera)[picture, 0] for end in edge.ends)
+    near, far = (
+        divisor(solid.vertices[[end]], pictures.sensors, pictures.scene.camera)[picture, 0] for end in edge.ends
+    )
     return fractions * near / (far + fractions * (near - far))
 
 

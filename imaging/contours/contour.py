@@ -1,7 +1,8 @@
-"""The contour of a surface: the points at which lines through the eye touch it.
+"""The contour of a surface: the points at which lines of sight touch it.
 
-There the normal N is across the line of sight: N . (X - e) = 0. On a quadric these points lie in the eye's polar plane;
-on a cone or a cylinder they are two lines, on a sphere a circle, on a torus one or two points a meridian.
+There the normal N is across the line of sight: N . (e - s X) = 0, (e, s) the eye (`scenes.viewpoint`), a place or at
+infinity. On a quadric these points lie in the eye's polar plane; on a cone or a cylinder they are two lines, on a
+sphere a circle, on a torus one or two points a meridian.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from imaging.contours.statuses import DEGENERATE, INSIDE, OK, TANGENT
 from imaging.contours.tori import torus_branches
 from scenes.parts.surfaces import Quadric, Sphere, Surface, Torus, axes_beside
 from scenes.parts.surfaces.ruled import Ruled
+from scenes.viewpoint import Viewpoint
 
 _NEAR = 1e-12  # of the radius: an eye no farther from a surface stands on it
 _LONGEST = 1e3  # distances of the eye: where a line without an end is cut
@@ -67,42 +69,48 @@ class Round:
         return self.centre + np.cos(angle) * self.one + np.sin(angle) * self.two
 
 
-@singledispatch
-def contour(surface: Surface, eye: np.ndarray) -> Contour:
-    """The contour of a surface from an eye (3,).
+def contour(surface: Surface, eye: Viewpoint | np.ndarray) -> Contour:
+    """The contour of a surface from an eye, or a place (3,).
 
     Trimmed at the surface's ends; whether other surfaces hide it is not asked.
     """
+    return _contour(surface, Viewpoint.of(eye))
+
+
+@singledispatch
+def _contour(surface: Surface, eye: Viewpoint) -> Contour:
     return Contour(DEGENERATE)
 
 
-@contour.register
-def _(surface: Sphere, eye: np.ndarray) -> Contour:
-    away = eye - surface.centre
+@_contour.register
+def _(surface: Sphere, eye: Viewpoint) -> Contour:
+    """Where N . (e - s c) = s r, c the centre, r the radius."""
+    away, near = eye.towards(surface.centre), eye.share * surface.radius
     far = float(np.linalg.norm(away))
-    over = (far - surface.radius) / surface.radius
+    over = (far - abs(near)) / surface.radius
     if over <= _NEAR:
         return Contour(INSIDE if over < -_NEAR else TANGENT)
-    axis, share = away / far, surface.radius / far
-    wide = surface.radius * np.sqrt((far - surface.radius) * (far + surface.radius)) / far
+    axis, share = away / far, near / far
+    wide = surface.radius * np.sqrt((far - near) * (far + near)) / far
     one, two = axes_beside(axis)
     return Contour(OK, (Round(surface.centre + surface.radius * share * axis, wide * one, wide * two),))
 
 
-@contour.register
-def _(wall: Ruled, eye: np.ndarray) -> Contour:
+@_contour.register
+def _(wall: Ruled, eye: Viewpoint) -> Contour:
     """Two generators, at the angles phi from the eye's radial with cos(phi) = r(z_e) / rho.
 
-    r(z_e) is the radius at the eye's height, rho the eye's distance from the axis.
+    r(z_e) is the radius at the eye's height, rho the eye's distance from the axis; of an eye at infinity the slope
+    times its direction's part along the axis, over that across.
     """
-    height, far, radial = (np.asarray(v) for v in wall.split(eye))
-    wide = wall.radius + wall.slope * float(height)
+    height, far, radial = (np.asarray(v) for v in wall.split(wall.point + eye.towards(wall.point)))
+    wide = eye.share * wall.radius + wall.slope * float(height)
     over = (float(far) - abs(wide)) / wall.radius
     if over <= _NEAR:
         return Contour(TANGENT if over >= -_NEAR and far > 0 else INSIDE)
     cosine, sine = wide / far, np.sqrt((far - wide) * (far + wide)) / far
     beside = np.cross(wall.axis, radial)
-    long = _LONGEST * (np.linalg.norm(eye - wall.point) + wall.radius)
+    long = _LONGEST * (np.linalg.norm(eye.towards(wall.point)) + wall.radius)
     low, high = np.clip(wall.ends, -long, long)
     branches = []
     for side in (-1.0, 1.0):
@@ -112,11 +120,11 @@ def _(wall: Ruled, eye: np.ndarray) -> Contour:
     return Contour(OK, tuple(branches))
 
 
-@contour.register
-def _(surface: Torus, eye: np.ndarray) -> Contour:
+@_contour.register
+def _(surface: Torus, eye: Viewpoint) -> Contour:
     return Contour(*torus_branches(surface, eye))
 
 
-@contour.register
-def _(surface: Quadric, eye: np.ndarray) -> Contour:
+@_contour.register
+def _(surface: Quadric, eye: Viewpoint) -> Contour:
     return Contour(*quadric_branches(surface, eye))

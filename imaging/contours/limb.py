@@ -1,8 +1,9 @@
 """The limb of a surface in the image, and what moves it.
 
 At a limb the tangent plane holds the eye. A surface that moves by s along its normal N there, to first order, moves
-the limb by s f / (z h) px along the image's normal: f the focal length in px, z the depth, h the length of N's part
-across the camera's axis. Whatever is changed - a radius, an axis, the eye - acts by that alone.
+the limb by s f / (z h) px along the image's normal: f the focal length in px, z the depth (or what else f is divided by
+there, `scenes.Camera.divisor`), h the length of N's part across the camera's axis. Whatever is changed - a radius, an
+axis, the eye - acts by that alone.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ import numpy as np
 
 from imaging.contours.contour import Branch, contour
 from imaging.contours.statuses import BEHIND, CONCAVE, OK
-from imaging.geometry.projection import camera_frame, depth, from_axis, sensor_position
+from imaging.geometry.projection import camera_frame, depth, divisor, from_axis, viewpoint
 from scenes import Camera
 from scenes.parts.surfaces import Surface, Torus
 from scenes.parts.surfaces.roots import quadratic_roots
 from scenes.parts.surfaces.surface import outwards
+from scenes.viewpoint import Viewpoint
 
 _AHEAD = 1e-6  # least cosine between the line of sight and the camera's axis
 _SAME = 1e-3  # tubes: a root as near to where the line touches is that
@@ -100,7 +102,7 @@ def limb(surface: Surface, sensor, camera: Camera, parameters: int | np.ndarray 
     True
     """
     pose = np.array(list(sensor), float)
-    eye = sensor_position(camera, pose)
+    eye = viewpoint(camera, pose)
     found = contour(surface, eye)
     if found.status != OK:
         return Limb(found.status)
@@ -121,12 +123,12 @@ def _steps(branch: Branch, parameters: int | np.ndarray) -> np.ndarray:
     return np.asarray(parameters, float)
 
 
-def _strand(surface, pose, camera, eye, branch: Branch, u: np.ndarray) -> tuple[Strand | None, str]:
+def _strand(surface, pose, camera, eye: Viewpoint, branch: Branch, u: np.ndarray) -> tuple[Strand | None, str]:
     """What is seen of a branch, or why nothing is."""
     points = branch.points(u)
-    away = points - eye
+    away = -eye.towards(points)
     far = np.linalg.norm(away, axis=-1)
-    ahead = depth(points, pose, camera) > _AHEAD * far
+    ahead = (away @ camera_frame(camera, pose).forward > _AHEAD * far) & (depth(points, pose, camera) > 0)
     if not ahead.any():
         return None, BEHIND
     sight = away / np.where(far > 0, far, 1.0)[:, None]
@@ -147,7 +149,7 @@ def _made(surface, pose, camera, points, u, arc, bend, operator, sight, closed) 
     across = np.stack([normals @ axes.right, normals @ axes.down], -1)
     size = np.linalg.norm(across, axis=-1)
     outward = across / size[:, None]
-    magnification = camera.focal_px / (depth(points, pose, camera) * size)
+    magnification = camera.focal_px / (divisor(points, pose, camera) * size)
     return Strand(
         u=u,
         points=points,
@@ -173,15 +175,13 @@ def _curvature(points, normals, operator, sight, outward, size, pose, camera) ->
     screen = np.stack([axes.right, axes.down])
     tangent = np.stack([-outward[:, 1], outward[:, 0]], -1)
     turn = ((turned @ screen.T) * tangent).sum(-1) / size
-    z = depth(points, pose, camera)[:, None]
-    moved = (
-        camera.focal_px * (along @ screen.T / z) - from_axis(points, pose, camera) * (along @ axes.forward)[:, None] / z
-    )
+    over, nearer = divisor(points, pose, camera)[:, None], camera.perspective * (along @ axes.forward)[:, None]
+    moved = (camera.focal_px * (along @ screen.T) - from_axis(points, pose, camera) * nearer) / over
     return turn / (moved * tangent).sum(-1)
 
 
 def _self_hidden(
-    surface: Surface, eye: np.ndarray, points: np.ndarray, sight: np.ndarray, far: np.ndarray
+    surface: Surface, eye: Viewpoint, points: np.ndarray, sight: np.ndarray, far: np.ndarray
 ) -> np.ndarray:
     """Whether the surface lies before where a line touches it: a quadric never does, a torus may.
 
@@ -195,7 +195,8 @@ def _self_hidden(
     rest = (away**2).sum(-1) + surface.radius**2 - surface.tube**2
     inner = 4 * slope**2 + 2 * rest - 4 * surface.radius**2 * (flat**2).sum(-1)
     others = quadratic_roots(np.ones_like(slope), 2 * slope, inner)
-    before = (others < -_SAME * surface.tube) & (others > -far[:, None])
+    begin = far / eye.share if eye.share > 0 else np.full(len(far), np.inf)  # lines of sight, that far away
+    before = (others < -_SAME * surface.tube) & (others > -begin[:, None])
     return before.any(-1) if outwards(surface.hollow) > 0 else np.zeros(len(points), bool)
 
 

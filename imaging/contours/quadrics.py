@@ -2,7 +2,8 @@
 
 A line e + t d through the eye e meets f = x'Ax + b'x + c in two, one or no points as d'Md is positive, zero or
 negative, M = g g' - f(e) A with g half the gradient at e. It touches in the eye's polar plane
-g . X + b . e / 2 + c = 0, where the contour is a conic.
+g . X + b . e / 2 + c = 0, where the contour is a conic. In homogeneous coordinates (e, s), of an eye that may be at
+infinity, f(e) = e'Ae + s b'e + s^2 c, g = Ae + s b / 2, and the plane is g . X + b . e / 2 + s c = 0.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from imaging.contours.statuses import DEGENERATE, INSIDE, NONE, OK, TANGENT
 from scenes.parts.surfaces import Quadric, axes_beside
 from scenes.parts.surfaces.surface import outwards
+from scenes.viewpoint import Viewpoint
 
 _TANGENT, _RANK = 1e-11, 1e-11  # of the largest part
 _INFINITE = 1e-9  # of the homogeneous coordinates' length: a last one below is a point too far away
@@ -33,7 +35,7 @@ class Touched:
     """
 
     quadric: Quadric
-    eye: np.ndarray
+    eye: Viewpoint
     levels: tuple[float, float, float]
     axes: np.ndarray
     start: np.ndarray
@@ -58,10 +60,10 @@ class Touched:
     @cached_property
     def _turns(self) -> np.ndarray:
         """Angles at which the line of sight has turned by equal parts."""
-        turns = 2 * np.pi * _NODES
+        turns, away = 2 * np.pi * _NODES, self.start - self.eye.origins(self.start)
         for _ in range(_ROUNDS):
             place = self._homogeneous(turns)
-            way = place[:, :2] @ self.frame.T + place[:, 2:] * (self.start - self.eye)
+            way = place[:, :2] @ self.frame.T + place[:, 2:] * away
             way = way / np.linalg.norm(way, axis=1, keepdims=True)
             step = np.linalg.norm(np.cross(way[1:], way[:-1]), axis=1)
             run = np.concatenate([[0.0], np.cumsum(step + _LEAST * step.sum() / len(step))])
@@ -69,9 +71,11 @@ class Touched:
         return turns
 
 
-def quadric_branches(quadric: Quadric, eye: np.ndarray) -> tuple[str, tuple[Touched, ...]]:
-    """Status and branches from an eye (3,)."""
-    level, half = quadric.function(eye), quadric.gradient(eye) / 2
+def quadric_branches(quadric: Quadric, eye: Viewpoint) -> tuple[str, tuple[Touched, ...]]:
+    """Status and branches from an eye."""
+    at, less = eye.at, eye.share - 1
+    level = quadric.function(at) + less * (quadric.linear @ at) + (eye.share**2 - 1) * quadric.constant
+    half = quadric.gradient(at) / 2 + less * quadric.linear / 2
     size = max(abs(level) * np.abs(quadric.form).max(), half @ half)
     if not quadric.form.any() or not size > 0:
         return DEGENERATE, ()
@@ -92,21 +96,21 @@ def quadric_branches(quadric: Quadric, eye: np.ndarray) -> tuple[str, tuple[Touc
     return OK, (Touched(quadric, eye, levels, vectors[:, [1, 2, 0]], start, frame),)
 
 
-def _polar_plane(quadric: Quadric, eye: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _polar_plane(quadric: Quadric, eye: Viewpoint, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A point of the polar plane, the conic's centre where it has one, and two vectors in it of about its size.
 
     However far the eye is, the plane is near the quadric: its coordinates lose nothing.
     """
     normal = half / np.linalg.norm(half)
     beside = np.stack(axes_beside(normal), -1)
-    start = -(quadric.linear @ eye / 2 + quadric.constant) / np.linalg.norm(half) * normal
+    start = -(quadric.linear @ eye.at / 2 + eye.share * quadric.constant) / np.linalg.norm(half) * normal
     values, vectors = np.linalg.eigh(beside.T @ quadric.form @ beside)
     curved = np.abs(values) > _CENTRE * np.abs(quadric.form).max()
     along = beside @ vectors
     slope = quadric.gradient(start) @ along / 2
     start = start - along[:, curved] @ (slope[curved] / values[curved])
     bend, over = np.abs(values).max(), abs(quadric.function(start))
-    far, out = np.linalg.norm(start - eye), np.linalg.norm(start)
+    far, out = np.linalg.norm(eye.towards(start)), np.linalg.norm(start)
     known = np.abs(quadric.form).max() * out**2 + np.linalg.norm(quadric.linear) * out + abs(quadric.constant)
     clear = over > _ROUNDING * known and over < bend * far**2
     return start, along * (np.sqrt(over / bend) if clear else far)
@@ -121,20 +125,21 @@ def _in_plane(quadric: Quadric, start: np.ndarray, frame: np.ndarray) -> np.ndar
     return found / max(np.abs(found).max(), np.finfo(float).tiny)
 
 
-def _polished(quadric: Quadric, eye: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Newton's method for f(X) = 0 and grad f(X) . (X - e) = 0, along the normal and the line of sight.
+def _polished(quadric: Quadric, eye: Viewpoint, points: np.ndarray) -> np.ndarray:
+    """Newton's method for f(X) = 0 and grad f(X) . (s X - e) = 0, along the normal and the line of sight.
 
     It settles what the rank of a nearly degenerate conic left open.
     """
     for _ in range(_POLISH):
-        slope, away = quadric.gradient(points), points - eye
+        slope, away = quadric.gradient(points), -eye.towards(points)
         far = np.linalg.norm(away, axis=-1, keepdims=True)
         size = np.linalg.norm(slope, axis=-1, keepdims=True)
         with np.errstate(all="ignore"):
             normal, sight = slope / size, away / far
             bent = 2 * away @ quadric.form
             a, b = (slope * normal).sum(-1), (slope * sight).sum(-1)
-            c, d = ((bent + slope) * normal).sum(-1), ((bent + slope) * sight).sum(-1)
+            bent = bent + eye.share * slope
+            c, d = (bent * normal).sum(-1), (bent * sight).sum(-1)
             one, two = -quadric.function(points), -(slope * away).sum(-1)
             both = a * d - b * c
             move = ((one * d - two * b) / both)[:, None] * normal + ((a * two - c * one) / both)[:, None] * sight

@@ -17,7 +17,7 @@ from imaging.features.locator import edge_blur, reach
 from imaging.features.rim_sides import RIM_POINTS, steady, to_curve
 from imaging.features.sampling import sampled_places
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import from_axis, rays
+from imaging.geometry.projection import from_axis, ray_origins, rays
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, has_background, signal
 from imaging.light.revolved import light_around, passes, rings_of
@@ -92,8 +92,8 @@ def seen_along(pictures: Pictures, curved: Curved, outline: LimbOutline) -> np.n
     scene, found = pictures.scene, outline.seen & framed(outline, pictures.scene)
     if scene.bodies.is_convex or not found.any():
         return found
-    eye = np.broadcast_to(pictures.sensor_at[..., None, :], outline.points.shape)
-    found[found] = _free(scene, curved, eye[found], outline.points[found])
+    start = pictures.viewpoint.widened().origins(outline.points)
+    found[found] = _free(scene, curved, start[found], outline.points[found])
     return found
 
 
@@ -121,7 +121,7 @@ def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, se
 
 def _disturbed(pictures: Pictures, outline: LimbOutline, far: float) -> np.ndarray:
     """Places nearer than ``far`` px to an edge of the part that the sensor sees, bool, shape (..., n)."""
-    solid, sensors, eyes = pictures.scene.solid, pictures.sensors, pictures.sensor_at
+    solid, sensors, views = pictures.scene.solid, pictures.sensors, pictures.viewpoint
     at, found = np.nan_to_num(outline.at, nan=1e9), np.zeros(outline.at.shape[:-1], bool)
     low = np.nan_to_num(outline.at, nan=np.inf).min(-2) - far
     high = np.nan_to_num(outline.at, nan=-np.inf).max(-2) + far
@@ -134,8 +134,8 @@ def _disturbed(pictures: Pictures, outline: LimbOutline, far: float) -> np.ndarr
         return ~((curves.max(-2) < low[..., None, :]) | (curves.min(-2) > high[..., None, :])).any(-1)
 
     def shown(places: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        eye, to = np.broadcast_arrays(eyes[rows][:, None], places)
-        return first_face(pictures.scene.bodies, eye, to - eye, ())[1] > 1 - _BEFORE
+        start, to = np.broadcast_arrays(views[rows].widened().origins(places), places)
+        return first_face(pictures.scene.bodies, start, to - start, ())[1] > 1 - _BEFORE
 
     for rim in solid.rims:
         places = rim.at(rim.angles(RIM_POINTS))
@@ -173,12 +173,11 @@ def _profile(
     places = np.sort((chebyshev.chebpts1(_NODES) + 1) / 2)
     away = (far * places**2)[:, None]
     at = np.nan_to_num(outline.at)[..., None, :] - away * np.nan_to_num(outline.outward)[..., None, :]
-    eye = pictures.sensor_at[..., None, None, :]
-    way = rays(at, pictures.sensors[..., None, None, :], camera)
-    met = curved.surface.intersections(np.broadcast_to(eye, way.shape), way)
+    way, start = (make(at, pictures.sensors[..., None, None, :], camera) for make in (rays, ray_origins))
+    met = curved.surface.intersections(start, way)
     first = np.where(met > 0, met, np.inf).min(-1)
     hit = np.isfinite(first) & outline.seen[..., None]
-    where = np.where(hit[..., None], eye + np.where(hit, first, 0.0)[..., None] * way, points[..., None, :])
+    where = np.where(hit[..., None], start + np.where(hit, first, 0.0)[..., None] * way, points[..., None, :])
     material = scene.surfaces.of(curved.faces[0])
     found = signal(
         pictures, where, curved.surface.normals(where), 2, _lit(pictures, curved, points, where), material=material

@@ -8,7 +8,7 @@ import numpy as np
 
 from imaging.contours import OK, Strand, limb
 from imaging.features.locator import MOST_PLACES, SPACING, reach
-from imaging.geometry.projection import sensor_position
+from imaging.geometry.projection import viewpoint
 from scenes import Camera, Curved, Scene
 from scenes.parts.surfaces import Sphere
 
@@ -62,7 +62,7 @@ def limb_outline(curved: Curved, sensors: np.ndarray, camera: Camera, count: int
 def _from_one(curved: Curved, pose: np.ndarray, camera: Camera, count: int) -> LimbOutline:
     found = limb(curved.surface, pose, camera, count if isinstance(curved.surface, Sphere) else count // _STRANDS)
     strands = found.strands if found.status == OK else ()
-    take = curved.parameters(sensor_position(camera, pose)) if strands else np.zeros((1, curved.count))
+    take = curved.parameters(viewpoint(camera, pose)) if strands else np.zeros((1, curved.count))
     if isinstance(curved.surface, Sphere):
         pieces = [_piece(strand, take, count) for strand in strands]
         return _joined(pieces, count, curved.count)

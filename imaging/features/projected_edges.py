@@ -14,7 +14,7 @@ import numpy as np
 
 from imaging.features.locator import reach
 from imaging.geometry.lens import image_centre, recorded
-from imaging.geometry.projection import depth, facing, from_axis
+from imaging.geometry.projection import divisor, facing, from_axis
 from imaging.geometry.visibility import boundaries, longest_span, turned
 from imaging.pictures import Pictures
 from scenes import Centre, Corner, Edge, Scene, Solid, Wall
@@ -104,8 +104,8 @@ def projected_edges(pictures: Pictures, names: tuple[str, ...] | None = None) ->
 
 
 def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
-    scene, solid, sensors, positions = pictures.scene, pictures.scene.solid, pictures.sensors, pictures.sensor_at
-    seen = facing(solid, positions)
+    scene, solid, sensors, view = pictures.scene, pictures.scene.solid, pictures.sensors, pictures.viewpoint
+    seen = facing(solid, view)
     edges = [solid.edge(name) for name in names]
     needed, clear, lead = (
         _near(solid, edges),
@@ -119,7 +119,7 @@ def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
     ends = _stack([np.stack([corners[end] for end in e.ends], -2) for e in edges], lead, (2, 2))
     trims = _stack(trims, lead, (2,))
     shown = image_fractions(
-        scene, names, sensors, _stack([longest_span(scene.bodies, e, positions) for e in edges], lead, (2,))
+        scene, names, sensors, _stack([longest_span(scene.bodies, e, view) for e in edges], lead, (2,))
     )
     along = ends[..., 1, :] - ends[..., 0, :]
     lengths, ends = np.linalg.norm(along, axis=-1), ends + image_centre(scene.camera)
@@ -134,7 +134,7 @@ def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
         recorded=bent,
         framed=cut(trims, within_image(scene, bent), lengths, 0.0),
         shown=shown,
-        visible=_stack([turned(scene.bodies, edge, positions).any(-1) for edge in edges], lead, ()).astype(bool)
+        visible=_stack([turned(scene.bodies, edge, view).any(-1) for edge in edges], lead, ()).astype(bool)
         & (shown[..., 1] > 0)
         & np.isfinite(bent).all((-1, -2)),
     )
@@ -166,16 +166,20 @@ def within_image(scene: Scene, ends: np.ndarray) -> np.ndarray:
 
 def image_fractions(scene: Scene, names: tuple[str, ...], sensors: np.ndarray, spatial: np.ndarray) -> np.ndarray:
     """Fractions of each edge's IMAGE length from fractions (..., E, n) of its length in space."""
-    near, far = end_depths(scene, names, sensors)
+    near, far = end_divisors(scene, names, sensors)
     with np.errstate(divide="ignore", invalid="ignore"):
         return spatial * far / (near + spatial * (far - near))
 
 
-def end_depths(scene: Scene, names: tuple[str, ...], sensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Depths of both ends of each edge, scene units, each (..., E, 1)."""
-    ends = np.array([scene.solid.vertices[list(scene.solid.edge(name).ends)] for name in names]).reshape(-1, 3)
-    found = depth(ends, sensors, scene.camera).reshape(*sensors.shape[:-1], len(names), 2)
+def end_divisors(scene: Scene, names: tuple[str, ...], sensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`divisor` at both ends of each edge, scene units, each (..., E, 1)."""
+    found = divisor(edge_ends(scene, names), sensors, scene.camera).reshape(*sensors.shape[:-1], len(names), 2)
     return found[..., :1], found[..., 1:]
+
+
+def edge_ends(scene: Scene, names: tuple[str, ...]) -> np.ndarray:
+    """Both ends of edges, one after the other, scene units, shape (2 E, 3)."""
+    return np.array([scene.solid.vertices[list(scene.solid.edge(name).ends)] for name in names]).reshape(-1, 3)
 
 
 def _stack(arrays: list, lead: tuple[int, ...], tail: tuple[int, ...]) -> np.ndarray:

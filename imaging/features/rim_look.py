@@ -16,8 +16,8 @@ from imaging.features.locator import edge_blur
 from imaging.features.rim_outline import facets, outline_beside, zero_of_steps
 from imaging.features.rim_sides import RIM_POINTS, outward_normals
 from imaging.geometry.lens import image_centre, lens_jacobian
-from imaging.geometry.projection import from_axis, rays
-from imaging.light.appearance import seen_by_rays
+from imaging.geometry.projection import from_axis
+from imaging.light.appearance import seen_at
 from imaging.pictures import Pictures
 from scenes import Circle
 
@@ -243,8 +243,7 @@ def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     found = np.empty(len(points))
     for k in range(0, len(points), _AT_ONCE):
         part = slice(k, k + _AT_ONCE)
-        seen = rays(np.nan_to_num(points[part]), pictures.sensors, pictures.scene.camera)
-        found[part] = seen_by_rays(pictures, seen)
+        found[part] = seen_at(pictures, np.nan_to_num(points[part]))
     return found
 
 

@@ -13,6 +13,7 @@ from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, face_signal, of_sides
 from imaging.pictures import Pictures
 from scenes import Circle, Edge, Solid
+from scenes.viewpoint import Viewpoint
 
 RIM_POINTS = 64
 _JUMP = 0.2  # of the contrast between neighbouring places
@@ -70,11 +71,11 @@ def shading_shift(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.n
     face_at = points + face_step[..., :1] * along + face_step[..., 1:] * radial
     wall_at = circle.centre + circle.radius * spokes - wall_step[..., 1:] * circle.axis
     levels = _sides_at(pictures, circle, angle, True)
-    slopes = []
+    slopes, view = [], pictures.viewpoint.widened()
     both = zip((levels[..., 0, :], levels[..., 1, :]), (face_at, wall_at), (circle.axis, -sense * spokes), strict=True)
     for (level, at, facing), face in zip(both, sided(scene.solid, circle), strict=True):
         there = face_signal(pictures, at, face, 1, normals=np.broadcast_to(facing, at.shape))
-        towards = np.einsum("...i,...i->...", np.broadcast_to(facing, at.shape), pictures.sensor_at[..., None, :] - at)
+        towards = np.einsum("...i,...i->...", np.broadcast_to(facing, at.shape), view.towards(at))
         slopes.append(np.where((level > 0) & (there > 0) & (towards > 0), (there - level) / _STEP, 0.0))
     contrast = levels[..., 0, :] - levels[..., 1, :]  # face less wall; outside less inside, or the other way round
     variance = scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
@@ -128,12 +129,12 @@ def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndar
     """Whether the sensor sees a rim at angles, whatever the light, bool, shape (..., n)."""
     radial = circle.spokes(angle)
     points = circle.centre + circle.radius * radial
-    sensor_at = pictures.sensor_at[..., None, :]
+    view = pictures.viewpoint
     turned = [
-        np.einsum("...i,...i->...", normal, sensor_at - points) > 0
+        np.einsum("...i,...i->...", normal, view.widened().towards(points)) > 0
         for normal in (np.broadcast_to(circle.axis, points.shape), -radial if circle.hole else radial)
     ]
-    return (turned[0] | turned[1]) & _free(pictures.scene.bodies, _probe(pictures, circle, points), sensor_at)
+    return (turned[0] | turned[1]) & _free(pictures.scene.bodies, _probe(pictures, circle, points), view)
 
 
 def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
@@ -150,7 +151,7 @@ def clearance(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarr
         spokes = other.spokes(other.angles(RIM_POINTS))
         far = other.centre + other.radius * spokes
         wall = -spokes if other.hole else spokes
-        turned = np.einsum("...i,...i->...", wall, pictures.sensor_at[..., None, :] - far) > 0
+        turned = np.einsum("...i,...i->...", wall, pictures.viewpoint.widened().towards(far)) > 0
         nearest = np.minimum(nearest, to_curve(there, _image(pictures, far), other.joined(turned)))
     ends = _image(pictures, _straight_around(solid, circle))
     return np.minimum(nearest, _to_pieces(there, ends[..., ::2, :], ends[..., 1::2, :]))
@@ -263,16 +264,16 @@ def _sides_at(pictures: Pictures, circle: Circle, angle: np.ndarray, fall_off: b
 
 def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.ndarray:
     """Signals (..., 2, n) of the plane face and of the wall, or what is seen past the rim; 0 at hidden points."""
-    bodies, sensor_at = pictures.scene.bodies, pictures.sensor_at[..., None, :]
+    bodies, view = pictures.scene.bodies, pictures.viewpoint
     wall = -radial if circle.hole else radial
     probe = _probe(pictures, circle, points)
-    lit = tuple(_free(bodies, probe, emitter.at[..., None, :]) for emitter in pictures.emitters)
+    lit = tuple(_free(bodies, probe, Viewpoint(emitter.at)) for emitter in pictures.emitters)
     sides = []
     normals = np.broadcast_to(circle.axis, points.shape), wall
     for face, normal in zip(sided(pictures.scene.solid, circle), normals, strict=True):
-        turned = np.einsum("...i,...i->...", normal, sensor_at - points) > 0
+        turned = np.einsum("...i,...i->...", normal, view.widened().towards(points)) > 0
         sides.append((turned, face_signal(pictures, points, face, 1, lit, normals=normal, fall_off=fall_off)))
-    seen = _free(bodies, probe, sensor_at) & (sides[0][0] | sides[1][0])
+    seen = _free(bodies, probe, view) & (sides[0][0] | sides[1][0])
     levels = []
     for turned, level in sides:
         wanted = seen & ~turned
@@ -286,10 +287,10 @@ def sided(solid: Solid, circle: Circle) -> tuple[int, int]:
     return circle.face, next(face for face in solid.edge(circle.edges[0]).faces if face != circle.face)
 
 
-def _free(bodies: Solid, probe, position) -> np.ndarray:
-    """Whether nothing stands between the rim's points and a position (..., 1, 3)."""
+def _free(bodies: Solid, probe, view: Viewpoint) -> np.ndarray:
+    """Whether nothing stands between the rim's points and viewpoints (...)."""
     if bodies.is_convex:
-        return np.ones((*position.shape[:-2], len(probe)), bool)
-    vectors = probe - position
-    _, t = first_face(bodies, np.broadcast_to(position, vectors.shape), vectors, ())
+        return np.ones((*view.shape, len(probe)), bool)
+    start = view.widened().origins(probe)
+    _, t = first_face(bodies, start, probe - start, ())
     return t > 1 - 1e-6

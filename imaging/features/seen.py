@@ -17,12 +17,13 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.geometry.projection import Frame, camera_frame, rays, sensor_position
+from imaging.geometry.projection import Frame, camera_frame, ray_origins, rays, sensor_position, viewpoint
 from scenes import Camera, Centre, Circle, Corner, Curved, Side, Solid, Wall
 from scenes.measurands.evaluated import Evaluated, Line, Moves, Point, mean, shared
 from scenes.measurands.features import Between, along_of, ends_of, face_beside, place_of, point_of
 from scenes.measurands.kind import turn
 from scenes.measurands.measurands import Quantity
+from scenes.viewpoint import Viewpoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +100,11 @@ class Seen:
         return sensor_position(self.camera, self.sensors)
 
     @cached_property
+    def viewpoint(self) -> Viewpoint:
+        """From where they look."""
+        return viewpoint(self.camera, self.sensors)
+
+    @cached_property
     def axes(self) -> Frame:
         return camera_frame(self.camera, self.sensors)
 
@@ -136,12 +142,12 @@ class Seen:
             line = side.made(self, plane)
             if plane is not None:
                 return mean([line.start, line.stop])
-            depths = self._depth(ends_of(self.solid, side))
-            return shared(line, depths[..., 0] / depths.sum(-1))
+            over = self._divisors(ends_of(self.solid, side))
+            return shared(line, over[..., 0] / over.sum(-1))
         e = self.names.index(side.edge)
         ends = self.solid.vertices[list(self.solid.edge(side.edge).ends)]
-        depths = np.moveaxis(self._depth(ends), -1, 0)
-        share = (depths[1] / (depths[0] + depths[1]))[..., None]  # of the image's length, by perspective
+        over = np.moveaxis(self._divisors(ends), -1, 0)
+        share = (over[1] / (over[0] + over[1]))[..., None]  # of the image's length, by perspective
         normal, along = self.normals[..., e, :], self.along[..., e, :]
         at = self.start[..., e, :] + share * along
         moves = {2 * e: normal, 2 * e + 1: normal * share * np.linalg.norm(along, axis=-1)[..., None]}
@@ -165,7 +171,7 @@ class Seen:
         if isinstance(feature, Side):
             middle = ends_of(self.solid, feature).mean(0)[None]
             return self.per_unit(feature, middle, self.normals[..., self.names.index(feature.edge), :])[..., 0]
-        return self.camera.focal_px / self.depth(self.solid.round(place_of(feature)).centre)
+        return self.camera.focal_px / self.divisor(self.solid.round(place_of(feature)).centre)
 
     def per_unit(self, side: Side, places: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """The same at places (..., n, 3) of an edge whose image has a unit normal (..., 2), shape (..., n)."""
@@ -176,10 +182,11 @@ class Seen:
     def _slopes(self, away: np.ndarray) -> np.ndarray:
         """Derivative of the image by places that are so far from the sensor (..., n, 3), px, (..., n, 2, 3)."""
         axes, focal = self.axes, self.camera.focal_px
-        z = np.einsum("...ni,...i->...n", away, axes.forward)[..., None, None]
+        over = self.camera.divisor(np.einsum("...ni,...i->...n", away, axes.forward))[..., None, None]
         screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
         at = focal * np.einsum("...nki,...ni->...nk", np.broadcast_to(screen, (*away.shape[:-1], 2, 3)), away)
-        return (focal * screen - at[..., None] / z * axes.forward[..., None, None, :]) / z
+        at = self.camera.perspective * at
+        return (focal * screen - at[..., None] / over * axes.forward[..., None, None, :]) / over
 
     def half_angle(self, wall: Wall) -> tuple[np.ndarray, int]:
         """Of a cone (...), rad, and its number among the parameters."""
@@ -188,11 +195,14 @@ class Seen:
 
     def sideways(self, each: Circle | Curved) -> tuple[np.ndarray, np.ndarray]:
         """The two directions (..., 3) in which the centre of a circle or a curved surface is found."""
-        return each.sideways(self.eye) if isinstance(each, Curved) else each.axes
+        return each.sideways(self.viewpoint) if isinstance(each, Curved) else each.axes
 
-    def depth(self, places: np.ndarray) -> np.ndarray:
-        """Distance of places (..., 3) from the sensor along its axis, shape (...)."""
-        return np.einsum("...i,...i->...", places - self.eye, self.axes.forward)
+    def divisor(self, places: np.ndarray) -> np.ndarray:
+        """What ``focal_px`` is divided by for the px of a unit length at places (..., 3), scene units, shape (...).
+
+        A pinhole's is the distance from the sensor along its axis.
+        """
+        return self.camera.divisor(np.einsum("...i,...i->...", places - self.eye, self.axes.forward))
 
     def slid(self, place: np.ndarray, step: np.ndarray) -> np.ndarray:
         """How the image of a place (3,) moves when it moves by a step (3,), to first order, px, shape (..., 2)."""
@@ -200,15 +210,15 @@ class Seen:
 
     def _slope(self, away: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Image (..., 2) of what is that far from the sensor (..., 3), and its derivative (..., 2, 3), px."""
-        axes, focal = self.axes, self.camera.focal_px
-        z = np.einsum("...i,...i->...", away, axes.forward)[..., None]
+        axes, focal, share = self.axes, self.camera.focal_px, self.camera.perspective
+        over = self.camera.divisor(np.einsum("...i,...i->...", away, axes.forward))[..., None]
         screen = np.stack([axes.right, axes.down], -2)
-        at = focal * np.einsum("...ki,...i->...k", screen, away) / z
-        return at, (focal * screen - at[..., None] * axes.forward[..., None, :]) / z[..., None]
+        at = focal * np.einsum("...ki,...i->...k", screen, away) / over
+        return at, (focal * screen - share * at[..., None] * axes.forward[..., None, :]) / over[..., None]
 
-    def _depth(self, points: np.ndarray) -> np.ndarray:
+    def _divisors(self, points: np.ndarray) -> np.ndarray:
         """The same of points (n, 3), shape (..., n)."""
-        return np.einsum("...ni,...i->...n", points - self.eye[..., None, :], self.axes.forward)
+        return self.camera.divisor(np.einsum("...ni,...i->...n", points - self.eye[..., None, :], self.axes.forward))
 
     def _centre(self, feature: Centre | Wall, in_space: bool) -> Point:
         _, point, _, _ = self.circle(feature)
@@ -234,19 +244,20 @@ class Seen:
         """Where the ray of an image point meets the plane of a unit normal through a place; moves go along."""
         axes, focal = self.axes, self.camera.focal_px
         if self.expected:
-            ray = place - self.eye
+            ray = -self.viewpoint.towards(place)
+            at = np.broadcast_to(place, ray.shape)
         else:
-            toward = rays(image.at, self.sensors, self.camera)
-            reach = np.einsum("...i,...i->...", plane, place - self.eye)
-            ray = toward * (reach / np.einsum("...i,...i->...", plane, toward))[..., None]
-        z = np.einsum("...i,...i->...", ray, axes.forward)[..., None]
+            ray, start = (make(image.at, self.sensors, self.camera) for make in (rays, ray_origins))
+            reach = np.einsum("...i,...i->...", plane, place - start) / np.einsum("...i,...i->...", plane, ray)
+            at = start + ray * reach[..., None]
+        over = self.divisor(at)[..., None]
         through = np.einsum("...i,...i->...", plane, ray)[..., None]
         columns = [
-            z / focal * (axis - ray * np.einsum("...i,...i->...", plane, axis)[..., None] / through)
+            over / focal * (axis - ray * np.einsum("...i,...i->...", plane, axis)[..., None] / through)
             for axis in (axes.right, axes.down)
         ]
         found = {k: columns[0] * move[..., :1] + columns[1] * move[..., 1:] for k, move in image.moves.items()}
-        return Point(np.broadcast_to(place, ray.shape) if self.expected else self.eye + ray, found)
+        return Point(at, found)
 
 
 def unit_normals(along: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import rays, sensor_position
+from imaging.geometry.projection import ray_origins, rays
 from imaging.geometry.rays import first_face
 from scenes import Picture
 
@@ -13,7 +13,7 @@ _MARGIN = 1e-7  # of the part's size: what passes a triangle's side more closely
 
 
 def looked_at(picture: Picture, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Faces of the bodies that a pinhole camera sees.
+    """Faces of the bodies that a camera without distortion sees.
 
     Parameters
     ----------
@@ -26,10 +26,10 @@ def looked_at(picture: Picture, seen: np.ndarray) -> tuple[np.ndarray, np.ndarra
     faces : ndarray of int, shape (n,)
         -1 where there is none.
     places : ndarray, shape (n, 3)
-        Where on them, scene units; the sensor's place where there is none.
+        Where on them, scene units; where the line of sight begins where there is none.
     """
     camera, sensor = picture.scene.camera, np.array(list(picture.sensor))
-    ways = rays(seen - image_centre(camera), sensor, camera)
-    origins = np.broadcast_to(sensor_position(camera, sensor), ways.shape)
+    image = seen - image_centre(camera)
+    ways, origins = rays(image, sensor, camera), ray_origins(image, sensor, camera)
     faces, t = first_face(picture.scene.bodies, origins, ways, (), margin=_MARGIN)
     return faces, origins + np.where(faces >= 0, t, 0.0)[:, None] * ways

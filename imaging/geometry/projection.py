@@ -2,6 +2,10 @@
 
 Everything takes arrays of poses, shape (..., 2) = (polar, azimuth) in degrees, and keeps the leading shape.
 Image coordinates are px with (0, 0) the centre of the first pixel, x to the right, y down.
+
+One formula serves all kinds of cameras: what lies beside the axis by b at the depth z is seen f b / ((1 - s) d + s z)
+from the image's middle, f the camera's ``focal_px``, d its distance, s its share of perspective: 1 of a pinhole, 0
+where all lines of sight are parallel (`scenes.Camera.divisor`, `scenes.viewpoint`).
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ import numpy as np
 
 from imaging.geometry.lens import image_centre, lens_jacobian, recorded
 from scenes import Camera, Luminaire, Solid
+from scenes.viewpoint import Viewpoint
 
 _EDGE_ON = 1e-12  # of the distance: how far over a face's plane the sensor must stand to see it
 
@@ -79,6 +84,12 @@ def sensor_position(camera: Camera, poses: np.ndarray) -> np.ndarray:
     return np.array(camera.look_at) + camera.distance * direction(poses)
 
 
+def viewpoint(camera: Camera, poses: np.ndarray) -> Viewpoint:
+    """From where the camera looks: where it stands, or a direction where its lines of sight are parallel."""
+    share = camera.perspective
+    return Viewpoint(share * np.array(camera.look_at) + camera.distance * direction(poses), share)
+
+
 def light_position(camera: Camera, light: Luminaire, poses: np.ndarray) -> np.ndarray:
     """Where a light stands, scene units, shape (..., 3): on a sphere around the point that the camera looks at.
 
@@ -110,7 +121,7 @@ def project(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray
 
 
 def project_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
-    """Ideal image coordinates of points (n, 3): a pinhole camera's, px, shape (..., n, 2)."""
+    """Ideal image coordinates of points (n, 3): those of a camera without distortion, px, shape (..., n, 2)."""
     return image_centre(camera) + from_axis(points, poses, camera)
 
 
@@ -119,12 +130,21 @@ def from_axis(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarr
     axes = camera_frame(camera, poses)
     beside = (points - np.array(camera.look_at)) @ np.stack([axes.right, axes.down], -1)
     away = _along(points, camera, axes)[..., None]
-    return camera.focal_px * beside / np.where(away > 0, away, np.nan)
+    over = camera.divisor(away)
+    return camera.focal_px * beside / np.where((away > 0) & (over > 0), over, np.nan)
 
 
 def depth(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """Distance of points (..., n, 3) from the sensor along its axis, scene units, shape (..., n)."""
     return _along(points, camera, frame(poses))
+
+
+def divisor(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """What ``focal_px`` is divided by for the px of a unit length at points (..., n, 3), scene units, shape (..., n).
+
+    It changes linearly along a line in space; shares of a line's image follow from it as from a pinhole's depth.
+    """
+    return camera.divisor(depth(points, poses, camera))
 
 
 def _along(points: np.ndarray, camera: Camera, axes: Frame) -> np.ndarray:
@@ -140,33 +160,49 @@ def jacobian(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarra
 def jacobian_ideal(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
     """Derivative of `project_ideal` (px) by the position (scene units) of points (n, 3), shape (..., n, 2, 3)."""
     axes = camera_frame(camera, poses)
-    z = _along(points, camera, axes)[..., None, None]
+    over, share = camera.divisor(_along(points, camera, axes))[..., None, None], camera.perspective
     screen = np.stack([axes.right, axes.down], -2)[..., None, :, :]
     beside = (points - np.array(camera.look_at)) @ np.moveaxis(screen[..., 0, :, :], -2, -1)
-    return camera.focal_px * (screen / z - beside[..., None] * axes.forward[..., None, None, :] / z**2)
+    return camera.focal_px * (screen / over - share * beside[..., None] * axes.forward[..., None, None, :] / over**2)
 
 
 def rays(image: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
-    """Vectors (..., 3) from the sensor through ideal image points (..., 2), px from the middle; `from_axis` back.
+    """Vectors (..., 3) along lines of sight through ideal image points (..., 2), px from the middle; `from_axis` back.
 
-    Along the axis they are ``focal_px`` long. Poses (..., 2) are broadcast against the points.
+    Along the axis they are ``focal_px`` long; they begin at `ray_origins`. Poses (..., 2) are broadcast against the
+    points.
     """
-    axes = camera_frame(camera, poses)
-    return image[..., :1] * axes.right + image[..., 1:] * axes.down + camera.focal_px * axes.forward
+    axes, share = camera_frame(camera, poses), camera.perspective
+    return share * image[..., :1] * axes.right + share * image[..., 1:] * axes.down + camera.focal_px * axes.forward
 
 
-def facing(solid: Solid, positions: np.ndarray) -> np.ndarray:
-    """Which faces turn towards a position (scene units, shape (..., 3)); bool, shape (..., F)."""
+def ray_origins(image: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray:
+    """Where lines of sight through ideal image points (..., 2), px from the middle, begin, scene units, (..., 3).
+
+    In the plane across the axis in which the sensor stands; all in one place where the camera is a pinhole.
+    """
+    share = camera.perspective
+    if share == 1:
+        place = sensor_position(camera, poses)
+        return np.broadcast_to(place, np.broadcast_shapes(place.shape, (*np.shape(image)[:-1], 3)))
+    axes, scale = camera_frame(camera, poses), camera.distance / camera.focal_px
+    beside = scale * (image[..., :1] * axes.right + image[..., 1:] * axes.down)
+    return sensor_position(camera, poses) + (1 - share) * beside
+
+
+def facing(solid: Solid, positions: np.ndarray | Viewpoint) -> np.ndarray:
+    """Which faces turn towards a position (scene units, shape (..., 3)) or a viewpoint; bool, shape (..., F)."""
     return above(positions, solid.normals, solid.offsets)
 
 
-def above(positions: np.ndarray, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Which planes (F, 3), (F,) positions (..., 3) stand over; bool, shape (..., F).
+def above(positions: np.ndarray | Viewpoint, normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Which planes (F, 3), (F,) positions (..., 3) or viewpoints stand over; bool, shape (..., F).
 
     A plane seen edge-on is not seen: cos(270 degrees) is -2e-16 in floating point, cos(-90 degrees) +6e-17, and a
     face must not come and go with the way in which an angle is written.
     """
-    return positions @ normals.T - offsets > _EDGE_ON * np.linalg.norm(positions, axis=-1, keepdims=True)
+    view = Viewpoint.of(positions)
+    return view.height(normals, offsets) > _EDGE_ON * np.linalg.norm(view.at, axis=-1, keepdims=True)
 
 
 def edge_points(solid: Solid, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Which parts of an edge a point in space can see: what the sensor sees, and what the light reaches.
 
-A triangle between a position s and an edge AB hides an interval of it. In the plane through s, A and B a point is
-s + a (A - s) + b (B - s); the ray from s through it meets AB at the fraction b / (a + b), and it lies before the edge
-where 0 < a + b < 1. So the interval is exact, and no ray has to be cast.
+A triangle between a viewpoint (e, s) and an edge AB hides an interval of it. In the plane through both a point is
+A + b (B - A) + c (e - s A); the line of sight through it meets AB at the fraction b / (1 - s c), and it lies before the
+edge where 0 < c and 0 < 1 - s c. So the interval is exact, and no ray has to be cast.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ import numpy as np
 
 from imaging.geometry.projection import above
 from scenes import Edge, Solid
+from scenes.viewpoint import Viewpoint
 
 _PAIRS = 20_000  # positions times triangles at once: what hides from one of many is looked for from each of them
 _BEFORE = 1e-9  # a triangle that touches the edge does not hide it; nothing is seen through a gap of this size
 
 
-def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+def hidden_spans(solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray) -> np.ndarray:
     """Fractions (from, to) of an edge that are hidden from positions.
 
     Parameters
     ----------
     solid : Solid
     edge : Edge
-    positions : ndarray, shape (..., 3)
-        Where the sensor or the light stands, outside the solid.
+    positions : Viewpoint or ndarray, shape (..., 3)
+        From where the sensor looks, or where a light stands, outside the solid.
 
     Returns
     -------
@@ -36,19 +37,22 @@ def hidden_spans(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
         Fractions of the edge's length in space, rising and apart from each other; (1, 0) where a position has less than
         K hidden pieces. K is 0 for a convex solid.
     """
+    view = Viewpoint.of(positions)
     if solid.is_convex:
-        return np.empty((*positions.shape[:-1], 0, 2))
-    different, which = np.unique(positions.reshape(-1, 3), axis=0, return_inverse=True)
-    spans = _hidden(solid, edge, different.tobytes())
-    return spans[which].reshape(*positions.shape[:-1], *spans.shape[1:])
+        return np.empty((*view.shape, 0, 2))
+    different, which = np.unique(view.at.reshape(-1, 3), axis=0, return_inverse=True)
+    spans = _hidden(solid, edge, different.tobytes(), view.share)
+    return spans[which].reshape(*view.shape, *spans.shape[1:])
 
 
 @lru_cache(maxsize=128)  # asked for several times of each set of pictures
-def _hidden(solid: Solid, edge: Edge, positions: bytes) -> np.ndarray:
-    """The same for different positions, shape (n, K, 2)."""
+def _hidden(solid: Solid, edge: Edge, positions: bytes, share: float) -> np.ndarray:
+    """The same for different viewpoints, shape (n, K, 2)."""
     rows = np.frombuffer(positions).reshape(-1, 3)
     size = max(1, _PAIRS // len(solid.triangles))
-    parts = [_united(_by_triangle(solid, edge, rows[at : at + size])) for at in range(0, len(rows), size)]
+    parts = [
+        _united(_by_triangle(solid, edge, Viewpoint(rows[at : at + size], share))) for at in range(0, len(rows), size)
+    ]
     spans = np.empty((len(rows), max((part.shape[-2] for part in parts), default=0), 2))
     spans[:] = 1.0, 0.0
     for part, at in zip(parts, range(0, len(rows), size), strict=True):
@@ -56,32 +60,33 @@ def _hidden(solid: Solid, edge: Edge, positions: bytes) -> np.ndarray:
     return spans
 
 
-def _by_triangle(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
-    """The interval that each of those triangles hides which may hide any; from > to for none; shape (..., T, 2).
+def _by_triangle(solid: Solid, edge: Edge, view: Viewpoint) -> np.ndarray:
+    """The interval that each of those triangles hides which may hide any; from > to for none; shape (n, T, 2).
 
     What is hidden from outside is hidden by a triangle that turns to the position: there the ray enters the solid.
     """
-    towards = above(positions, solid.normals, solid.offsets).any(tuple(range(positions.ndim - 1)))
+    towards = above(view, solid.normals, solid.offsets).any(0)
     towards[list(edge.faces)] = False
-    start, stop = (solid.vertices[end] - positions for end in edge.ends)
-    normal = np.cross(start, stop)
+    first, last = (solid.vertices[end] for end in edge.ends)
+    along, away = last - first, view.towards(first)
+    normal = np.cross(along, away)
     with np.errstate(divide="ignore", invalid="ignore"):
         normal = normal / np.einsum("...i,...i->...", normal, normal)[..., None]  # NaN where the edge is seen end-on
     points, corners = solid.triangle_corners
-    sides = _coordinates(points, positions, normal)
+    points = points - first
+    sides = _coordinates(points, normal)
     over = sides >= 0
     one, two, three = (over[..., each] for each in corners.T)
     some = (one != two) | (two != three)  # the others do not reach the plane of position and edge
-    some = some.any(tuple(range(some.ndim - 1))) & towards[solid.triangle_faces]
+    some = some.any(0) & towards[solid.triangle_faces]
     chosen = corners[some]
-    a, b = (_coordinates(points[chosen], positions, axis) for axis in (np.cross(stop, normal), np.cross(normal, start)))
-    return _merge(*_crossings(a, b, sides[..., chosen]))
+    b, c = (_coordinates(points[chosen], axis) for axis in (np.cross(away, normal), np.cross(normal, along)))
+    return _merge(*_crossings(b, c, sides[..., chosen]), view.share)
 
 
-def _coordinates(points: np.ndarray, positions: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Coordinates of points (..., 3) along axes (n, 3), or one, from the positions, shape (n, ...)."""
-    along = axis @ points.reshape(-1, 3).T - np.einsum("...j,...j->...", axis, positions)[..., None]
-    return along.reshape(*along.shape[:-1], *points.shape[:-1])
+def _coordinates(points: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Coordinates of points (..., 3) along axes (n, 3), shape (n, ...)."""
+    return (axes @ points.reshape(-1, 3).T).reshape(len(axes), *points.shape[:-1])
 
 
 def _united(spans: np.ndarray) -> np.ndarray:
@@ -103,22 +108,21 @@ def _united(spans: np.ndarray) -> np.ndarray:
     return found.reshape(*shape, *found.shape[1:])
 
 
-def _crossings(a: np.ndarray, b: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the three sides of each triangle cross the plane: a, b and whether they do, each (..., T, 3)."""
-    onward = [np.roll(values, -1, -1) for values in (a, b, above)]
+def _crossings(b: np.ndarray, c: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the three sides of each triangle cross the plane: b, c and whether they do, each (..., T, 3)."""
+    onward = [np.roll(values, -1, -1) for values in (b, c, above)]
     crosses = (above >= 0) != (onward[2] >= 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         f = np.where(crosses, above / (above - onward[2]), 0.0)
-    return a + f * (onward[0] - a), b + f * (onward[1] - b), crosses
+    return b + f * (onward[0] - b), c + f * (onward[1] - c), crosses
 
 
-def _merge(a: np.ndarray, b: np.ndarray, crosses: np.ndarray) -> np.ndarray:
+def _merge(b: np.ndarray, c: np.ndarray, crosses: np.ndarray, share: float) -> np.ndarray:
     """The hidden interval from the two points in which a triangle's boundary crosses the plane."""
     first = np.argmax(crosses, -1)[..., None]
     last = 2 - np.argmax(crosses[..., ::-1], -1)[..., None]
-    a1, a2, b1, b2 = (np.take_along_axis(v, i, -1)[..., 0] for v in (a, b) for i in (first, last))
-    near, far = a1 + b1, a2 + b2
-    low, high = _BEFORE, 1 - _BEFORE
+    b1, b2, near, far = (np.take_along_axis(v, i, -1)[..., 0] for v in (b, c) for i in (first, last))
+    low, high = _BEFORE, (1 - _BEFORE) / share if share > 0 else np.inf
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = far - near
         enter, leave = (low - near) / slope, (high - near) / slope
@@ -127,13 +131,13 @@ def _merge(a: np.ndarray, b: np.ndarray, crosses: np.ndarray) -> np.ndarray:
         f2 = np.where(flat, 1.0, np.clip(np.maximum(enter, leave), 0, 1))
         middle = near + (f1 + f2) / 2 * slope
         hit = crosses.any(-1) & (f2 > f1) & (middle > low) & (middle < high)
-        t1, t2 = ((b1 + f * (b2 - b1)) / (near + f * slope) for f in (f1, f2))
+        t1, t2 = ((b1 + f * (b2 - b1)) / (1 - share * (near + f * slope)) for f in (f1, f2))
     start, stop = np.fmin(t1, t2), np.fmax(t1, t2)
     hit &= (stop > 0) & (start < 1) & (stop > start)
     return np.stack([np.where(hit, start, 1.0), np.where(hit, stop, 0.0)], -1)
 
 
-def turned(solid: Solid, edge: Edge, positions: np.ndarray) -> np.ndarray:
+def turned(solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray) -> np.ndarray:
     """Which of an edge's two faces the position looks at, just beside the edge; bool, shape (..., 2).
 
     At an inner edge each face hides the other unless both are turned towards the position.
@@ -160,12 +164,12 @@ def boundaries(solid: Solid, edges: Sequence[Edge], faces: np.ndarray) -> np.nda
     return np.where(slight, sides.sum(-1) == 1, sides.any(-1))
 
 
-def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+def seen(solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray, fractions: np.ndarray) -> np.ndarray:
     """Which points of an edge nothing hides from a position, whatever way the edge's own faces turn.
 
     Parameters
     ----------
-    positions : ndarray, shape (..., 3)
+    positions : Viewpoint or ndarray, shape (..., 3)
     fractions : ndarray, shape (n,) or (..., n)
         Of the edge's length in space.
 
@@ -173,14 +177,15 @@ def seen(solid: Solid, edge: Edge, positions: np.ndarray, fractions: np.ndarray)
     -------
     ndarray of bool, shape (..., n)
     """
-    shape = np.broadcast_shapes((*positions.shape[:-1], 1), fractions.shape)
+    positions = Viewpoint.of(positions)
+    shape = np.broadcast_shapes((*positions.shape, 1), fractions.shape)
     clear = np.ones(shape, bool)
     for start, stop in np.moveaxis(hidden_spans(solid, edge, positions), (-2, -1), (0, 1)):
         clear &= (fractions <= start[..., None]) | (fractions >= stop[..., None])
     return clear
 
 
-def visible_spans(solid: Solid, edge: Edge, position: np.ndarray) -> list[tuple[float, float]]:
+def visible_spans(solid: Solid, edge: Edge, position: Viewpoint | np.ndarray) -> list[tuple[float, float]]:
     """The parts of an edge that one position sees, as fractions (from, to) of its length in space.
 
     Examples
@@ -200,17 +205,20 @@ def visible_spans(solid: Solid, edge: Edge, position: np.ndarray) -> list[tuple[
     return free + [(at, 1.0)] if at < 1 else free
 
 
-def longest_span(solid: Solid, edge: Edge, positions: np.ndarray, *more: np.ndarray) -> np.ndarray:
+def longest_span(
+    solid: Solid, edge: Edge, positions: Viewpoint | np.ndarray, *more: Viewpoint | np.ndarray
+) -> np.ndarray:
     """The longest part of an edge that nothing hides, (from, to) as fractions of its length in space, shape (..., 2).
 
     ``more`` are further positions (broadcast) from which the part has to be free too: sensor, then light.
     (0, 0) where nothing is left; the way the edge's own faces turn does not matter.
     """
-    shape = np.broadcast_shapes(positions.shape, *(p.shape for p in more))[:-1]
+    views = [Viewpoint.of(each) for each in (positions, *more)]
+    shape = np.broadcast_shapes(*(view.shape for view in views))
     whole = np.broadcast_to(np.array([0.0, 1.0]), (*shape, 2))
     if solid.is_convex:
         return whole
-    spans = [hidden_spans(solid, edge, p) for p in (positions, *more)]
+    spans = [hidden_spans(solid, edge, view) for view in views]
     spans = np.concatenate([np.broadcast_to(s, (*shape, *s.shape[-2:])) for s in spans], -2)
     order = np.argsort(spans[..., 0], -1)[..., None]
     spans = np.take_along_axis(spans, order, -2)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imaging import sensor
-from imaging.geometry.projection import camera_frame, edge_points, facing
+from imaging.geometry.projection import camera_frame, edge_points, facing, ray_origins, rays
 from imaging.geometry.rays import first_face, reaches
 from imaging.geometry.visibility import seen, turned
 from imaging.light.backlight import backlights, backlit
@@ -86,7 +86,7 @@ def signal(
         Whether irradiance falls with the squared distance from the light, as it does; eq. 1 has no such term.
     """
     scene, material = pictures.scene, material or pictures.scene.material
-    to_sensor = _unit(widened(pictures.sensor_at, axes) - points)
+    to_sensor = _unit(pictures.viewpoint.widened(axes).towards(points))
     analyser, total = analyser_axis(scene, pictures.sensors), 0.0
     for i, emitter in enumerate(pictures.emitters):
         arriving = beam(emitter, points, axes, fall_off=fall_off)
@@ -200,7 +200,7 @@ def side_signals(
     faces = np.array([edge.faces for edge in edges])
     if is_plain(scene):
         level = face_signal(pictures, points[..., None, :, :], faces[:, :, None], 3, fall_off=fall_off)
-        return np.where(facing(bodies, pictures.sensor_at)[..., faces, None], level, 0.0)
+        return np.where(facing(bodies, pictures.viewpoint)[..., faces, None], level, 0.0)
     return np.stack([_beside(pictures, e, points[..., i, :, :], fall_off) for i, e in enumerate(edges)], -3)
 
 
@@ -273,7 +273,7 @@ def _heights(pictures: Pictures, names: tuple[str, ...]) -> np.ndarray:
     scene, solid = pictures.scene, pictures.scene.solid
     faces = np.array([solid.edge(name).faces for name in names])
     height = np.maximum(pictures.lights_at[0] @ solid.normals.T - solid.offsets, 0.0)
-    return np.where(facing(solid, pictures.sensor_at), height * whites(scene)[: len(solid.faces)], 0.0)[..., faces]
+    return np.where(facing(solid, pictures.viewpoint), height * whites(scene)[: len(solid.faces)], 0.0)[..., faces]
 
 
 def whites(scene: Scene) -> np.ndarray:
@@ -293,8 +293,8 @@ def _beside(pictures: Pictures, edge: Edge, points: np.ndarray, fall_off: bool) 
     )
     level = face_signal(pictures, points[..., None, :, :], np.array(edge.faces)[:, None], 2, lit, fall_off=fall_off)
     level = level + light_between(pictures, points[..., None, :, :], np.array(edge.faces)[:, None])
-    looked_at = turned(bodies, edge, pictures.sensor_at)[..., None]
-    visible = (looked_at.any(-2) & seen(bodies, edge, pictures.sensor_at, fractions))[..., None, :]
+    looked_at = turned(bodies, edge, pictures.viewpoint)[..., None]
+    visible = (looked_at.any(-2) & seen(bodies, edge, pictures.viewpoint, fractions))[..., None, :]
     found = np.where(visible & looked_at, level, 0.0)
     outward = bodies.normals[list(edge.faces)].sum(0)
     for side, face in enumerate(edge.faces):
@@ -329,7 +329,7 @@ def behind(
         0 where the ray meets nothing, or what it meets is dark.
     """
     scene, bodies = pictures.scene, pictures.scene.bodies
-    vectors = points - widened(pictures.sensor_at, 1)
+    vectors = -pictures.viewpoint.widened().towards(points)
     face, t = _met(bodies, points, vectors, wanted, own)
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
     lit = tuple(_where(wanted & (face >= 0), hit, face, e.at, partial(reaches, bodies)) for e in pictures.emitters)
@@ -346,10 +346,17 @@ def behind(
     return np.where(wanted, found, 0.0)
 
 
-def seen_by_rays(pictures: Pictures, rays: np.ndarray) -> np.ndarray:
-    """Signal of what the sensor of one picture sees along rays (n, 3), shape (n,)."""
-    start = pictures.sensor_at + _NEAR * pictures.scene.solid.extent * _unit(rays)
-    return behind(pictures, start, np.ones(len(rays), bool), ())
+def seen_at(pictures: Pictures, image: np.ndarray) -> np.ndarray:
+    """Signal of what the sensor of one picture sees at image points (n, 2) from the middle, ideal px, shape (n,)."""
+    return seen_by_rays(
+        pictures, *(make(image, pictures.sensors, pictures.scene.camera) for make in (ray_origins, rays))
+    )
+
+
+def seen_by_rays(pictures: Pictures, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """The same along lines of sight from places (n, 3) on."""
+    start = origins + _NEAR * pictures.scene.solid.extent * _unit(vectors)
+    return behind(pictures, start, np.ones(len(vectors), bool), ())
 
 
 def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:

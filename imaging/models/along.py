@@ -8,8 +8,9 @@ import numpy as np
 
 from imaging.features.locator import reach
 from imaging.features.measurand import Measurands, measurands, normals
-from imaging.features.projected_edges import ProjectedEdges, cut, end_depths, image_fractions
+from imaging.features.projected_edges import ProjectedEdges, cut, edge_ends, end_divisors, image_fractions
 from imaging.geometry.lens import blur_at, lens_jacobian
+from imaging.geometry.projection import depth
 from imaging.geometry.visibility import longest_span
 from imaging.light.appearance import edge_contrast
 from imaging.light.backlight import backlights
@@ -76,10 +77,12 @@ def place_nodes(pictures: Pictures, view: ProjectedEdges, trims: np.ndarray) -> 
     length = np.where(length > 0, length, np.nan)
     middle = trims[..., :1] + length / 2
     t = length / 2 * np.concatenate([[-1], NODES, [1]])
-    near, far = end_depths(pictures.scene, view.names, pictures.sensors)
+    near, far = end_divisors(pictures.scene, view.names, pictures.sensors)
     fractions = (middle + t) / whole
     spatial = fractions * near / (far + fractions * (near - far))
-    blur = blur_at(camera, near + spatial * (far - near))
+    ends = depth(edge_ends(pictures.scene, view.names), pictures.sensors, camera)
+    ends = ends.reshape(*ends.shape[:-1], len(view.names), 2)
+    blur = blur_at(camera, ends[..., :1] + spatial * (ends[..., 1:] - ends[..., :1]))
     across = along = 1.0
     if camera.lens.bends:
         across, along = _magnified(camera, view, fractions)
@@ -114,13 +117,13 @@ def _span(pictures: Pictures, edge: Edge) -> np.ndarray:
 
     Of several lights, those that do not reach the edge at all are passed over.
     """
-    bodies, sensor_at, shown = pictures.scene.bodies, pictures.sensor_at, backlights(pictures.scene)
+    bodies, view, shown = pictures.scene.bodies, pictures.viewpoint, backlights(pictures.scene)
     lights_at = [at for i, at in enumerate(pictures.lights_at) if i not in shown]
     if len(lights_at) == 1:
-        return longest_span(bodies, edge, sensor_at, *lights_at)
-    found = longest_span(bodies, edge, sensor_at)
+        return longest_span(bodies, edge, view, *lights_at)
+    found = longest_span(bodies, edge, view)
     for at in lights_at:
-        lit = longest_span(bodies, edge, sensor_at, at)
+        lit = longest_span(bodies, edge, view, at)
         both = np.stack([np.maximum(found[..., 0], lit[..., 0]), np.minimum(found[..., 1], lit[..., 1])], -1)
         found = np.where(both[..., :1] < both[..., 1:], both, found)
     return found

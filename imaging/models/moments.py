@@ -74,7 +74,9 @@ def _many_sensors(scene, names, sensors, light, count):
     fractions = np.linspace(0, 1, count)
     points = edge_points(scene.solid, names, fractions) - np.array(scene.camera.look_at)
     weights = 1 / ((scene.lights[0].distance * direction(light) - points) ** 2).sum(-1)
-    plan = np.vstack([-points.reshape(-1, 3).T, np.full(points.shape[0] * count, scene.camera.distance)])
+    plan = np.vstack(
+        [-scene.camera.perspective * points.reshape(-1, 3).T, np.full(points.shape[0] * count, scene.camera.distance)]
+    )
     found = np.empty((3, len(sensors), len(names)))
     found[0] = weights.sum(-1)
     for at in range(0, len(sensors), _BLOCK):

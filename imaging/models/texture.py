@@ -19,7 +19,7 @@ from imaging.blurred.boundaries import sided
 from imaging.features.locator import edge_blur
 from imaging.features.measurand import Measurands, measurands, normals
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import edge_points, facing, jacobian_ideal, rays
+from imaging.geometry.projection import edge_points, facing, jacobian_ideal, ray_origins, rays
 from imaging.light.appearance import diffuse_signal, side_signals
 from imaging.light.sheets import Sheet, sheets
 from imaging.models.along import place_nodes, used_trims
@@ -146,7 +146,7 @@ def _texture_errors(pictures: Pictures) -> TextureErrors:
     view, known = told.view, sheets(scene)
     count = len(view.names)
     nodes = place_nodes(pictures, view, used_trims(pictures, view, trimmed=True))
-    seen = facing(scene.solid, pictures.sensor_at)
+    seen = facing(scene.solid, pictures.viewpoint)
     part, print_, responses = np.zeros(2 * count), np.zeros(2 * count), {face: [] for face in known}
     disturbed, unknown = np.zeros(count, bool), np.zeros(count, bool)
     rims = [not known.keys().isdisjoint(_around(scene.solid, name)) for name in told.circles]
@@ -191,7 +191,7 @@ def _of_edge(pictures: Pictures, e: int, nodes, length: float) -> _OfEdge:
     across, along = (float(np.mean(np.broadcast_to(part, nodes.t.shape)[e])) for part in (nodes.across, nodes.along))
     index = [edge.name for edge in solid.edges].index(name)
     faces = sided(solid)[index].tolist()  # opposite to the normal, and on its side
-    seen = facing(solid, pictures.sensor_at)
+    seen = facing(solid, pictures.viewpoint)
     places = _Places.of(
         length,
         float(blur) * across,
@@ -252,9 +252,9 @@ def _on_face(pictures: Pictures, view, e: int, along: np.ndarray, across: np.nda
     camera, solid = pictures.scene.camera, pictures.scene.solid
     tangent, normal = view.along[e] / view.lengths[e], normals(view)[e]
     image = view.ends[e, 0] + along[:, None] * tangent + across[:, None, None] * normal - image_centre(camera)
-    way = rays(image, pictures.sensors, camera)
-    height = solid.offsets[face] - solid.normals[face] @ pictures.sensor_at
-    return pictures.sensor_at + (height / (way @ solid.normals[face]))[..., None] * way
+    way, start = (make(image, pictures.sensors, camera) for make in (rays, ray_origins))
+    height = solid.offsets[face] - start @ solid.normals[face]
+    return start + (height / (way @ solid.normals[face]))[..., None] * way
 
 
 def field_covariance(sheet: Sheet, parts, count: int) -> np.ndarray:

@@ -249,7 +249,7 @@ def _edge_tool(picture: Picture, quantity: Quantity, off: tuple[float, float]) -
     known = measurands(Pictures.of(picture))
     e = known.view.names.index(name)
     ends = known.seen.solid.vertices[list(known.seen.solid.edge(name).ends)]
-    near, far = known.seen.depth(ends)
+    near, far = known.seen.divisor(ends)
     share = caliper.positions / caliper.length
     share = share * near / (far + share * (near - far))
     places = ends[0] + share[:, None] * (ends[1] - ends[0])

@@ -197,7 +197,7 @@ def _layout(picture: Picture, pictures: Pictures) -> Layout:
     names = straight(scene)
     view = projected_edges(pictures, names)
     points = project_ideal(solid.vertices, pose, scene.camera)
-    seen = facing(solid, pictures.sensor_at)
+    seen = facing(solid, pictures.viewpoint)
     wanted = picture.lights and names  # beside no edge nobody asks for it
     shadings = face_shadings(pictures) if wanted else [None] * len(solid.faces)
     turned = _boundaries(solid, seen)  # trimmed for whatever the light may be
@@ -269,7 +269,7 @@ def _boundaries(solid: Solid, seen: np.ndarray) -> list[Edge]:
 
 
 def _defocus(scene: Scene, pose: np.ndarray, required) -> np.ndarray:
-    """Signed radii of confusion at the edges' ends: inverse depth is linear in the image, and so are they."""
+    """Signed radii of confusion at the edges' ends: they are linear in the image."""
     ends = np.array([list(edge.ends) for edge in required], int).reshape(-1, 2)
     return signed_confusion(scene.camera, depth(scene.solid.vertices, pose, scene.camera)[ends])
 

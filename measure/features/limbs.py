@@ -23,7 +23,7 @@ from scenes import Curved, Picture, status
 def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> RimTool:
     """What measures a curved surface, expected with errors of its three parameters."""
     scene, pictures = picture.scene, Pictures.of(picture)
-    optics, curved = Optics.of(scene), nominal.moved(pictures.sensor_at, moved)
+    optics, curved = Optics.of(scene), nominal.moved(pictures.viewpoint, moved)
     count = limb_places(limb_outline(nominal, pictures.sensors, scene.camera), optics.scale_px)
     outline = limb_outline(curved, pictures.sensors, scene.camera, count)
     seen = limb_look(pictures, curved, outline) if pictures.lights else None

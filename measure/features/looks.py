@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imaging.geometry.lens import image_centre
-from imaging.geometry.projection import rays
-from imaging.light.appearance import seen_by_rays
+from imaging.light.appearance import seen_at
 from imaging.pictures import Pictures
 from imaging.sensor import recorded
 
@@ -47,5 +46,5 @@ class Looks:
     def __call__(self, places: np.ndarray) -> np.ndarray:
         """Recorded grey levels at places (n, 2), ideal px."""
         scene, seen = self.pictures.scene, (places - self.shift) @ self.turn
-        ways = rays(seen - image_centre(scene.camera), self.pictures.sensors, scene.camera)
-        return recorded(scene.noise, scene.noise.dark_level + seen_by_rays(self.pictures, ways)).level
+        found = seen_at(self.pictures, seen - image_centre(scene.camera))
+        return recorded(scene.noise, scene.noise.dark_level + found).level

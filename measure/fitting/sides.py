@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imaging.geometry.projection import facing, sensor_position
+from imaging.geometry.projection import facing, viewpoint
 from measure.fitting.information import covariance_of
 from measure.fitting.likelihood import Problem, most_likely
 from scenes import Noise
@@ -50,7 +50,7 @@ def _turns_away(problem: Problem, values: np.ndarray, i: int, which: np.ndarray,
     seen = []
     for there in (values - step, values, values + step):
         scene, (sensor, _) = parameters.scene_at(there), parameters.poses_at(there, k)
-        seen.append(facing(scene.solid, sensor_position(scene.camera, sensor)))
+        seen.append(facing(scene.solid, viewpoint(scene.camera, sensor)))
     return bool(np.not_equal(seen, seen[1]).any())
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from imaging.light.appearance import is_plain
 from imaging.pictures import Pictures
 from planner.budgeting.features import Features
+from planner.budgeting.products import products
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
 from planner.budgeting.terms import BIAS, EXPANSION, MODEL, TEMPERATURE, Term, terms
@@ -176,7 +177,8 @@ def budget(
     slopes = sensitivities(features, given, biased=biased)
     told = prediction if biased else predict(picture, model="bound")  # by the estimator that is meant
     noise = np.array([each.variance_object for each in told.measurands]) if variances is None else variances
-    beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased, doubts=doubts)
+    beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased, doubts=doubts,
+                   together=products(features, given))  # fmt: skip
     inputs, budgets = shared_inputs(picture.scene, given), []
     for each, slope, rows in zip(prediction.measurands, slopes, beside, strict=True):
         by_name = {source.name: float(c) for source, c in zip(given, slope, strict=True)}

@@ -12,6 +12,7 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.budgeting.budgets import SceneBudget, budget
 from planner.budgeting.features import Features
+from planner.budgeting.products import products
 from planner.budgeting.sensitivities import sensitivities
 from planner.budgeting.sources import Source, sources
 from planner.constraints import Constraints
@@ -131,10 +132,11 @@ def systematic(scene: Scene, sensor: np.ndarray, given: tuple[Source, ...], *, c
     pictures = Pictures.of(scene, sensor, _anywhere(scene))
     pictures = pictures if closely else replace(pictures, closely=False, _known={})
     with np.errstate(all="ignore"):
-        slopes = sensitivities(Features(pictures), still, biased=False)
+        features = Features(pictures)
+        slopes = sensitivities(features, still, biased=False)
         u = np.array([each.told.u for each in still])
         spread = slopes * u
-        return np.einsum("mi,ij,mj->m", spread, _correlation(scene, still), spread)
+        return np.einsum("mi,ij,mj->m", spread, _correlation(scene, still), spread) + products(features, still) ** 2
 
 
 def _correlation(scene: Scene, given: tuple[Source, ...]) -> np.ndarray:

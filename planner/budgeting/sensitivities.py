@@ -16,7 +16,7 @@ from planner.budgeting.features import Features
 from planner.budgeting.sources import Source
 from planner.budgeting.station import Station
 
-_STEP = 1e-5  # of an input's scale
+STEP = 1e-5  # of an input's scale
 
 
 def sensitivities(features: Features, given: tuple[Source, ...], *, biased: bool) -> np.ndarray:
@@ -48,7 +48,7 @@ def sensitivities(features: Features, given: tuple[Source, ...], *, biased: bool
 
 
 def _by_geometry(features: Features, here: Station, source: Source) -> np.ndarray:
-    step = _STEP * source.scale
+    step = STEP * source.scale
     ahead, behind = (features.errors(source.moved(here, sign * step)) for sign in (1, -1))
     return pulled(features.known.gradient_object, (ahead - behind) / (2 * step))
 

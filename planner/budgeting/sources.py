@@ -15,9 +15,10 @@ from scenes.numbers import number_at, with_number
 
 Kind = Literal["geometry", "brightness"]
 _GEOMETRY = ("focal_px", "focal_length_mm", "pixel_pitch_um", "distance", "working_distance_mm", "look_at",
-             "lens.distortion")  # fmt: skip
+             "lens.distortion", "magnification", "telecentricity_deg", "image_side_deg", "flange_mm")  # fmt: skip
 _UNITS = {
     "focal_px": "px", "focal_length_mm": "mm", "pixel_pitch_um": "um", "working_distance_mm": "mm", "blur_px": "px",
+    "flange_mm": "mm", "wavelength_nm": "nm",
     "exposure": "levels", "sigma": "levels", "dark_level": "levels", "dsnu": "levels",
 }  # fmt: skip
 _LENGTHS = ("distance", "look_at", "radius", "aperture_radius", "focus", "offset", "height", "half_side")

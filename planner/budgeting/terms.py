@@ -20,6 +20,7 @@ from scenes import Centre, Noise, Scene, Uncertain
 
 NOISE, PATTERN, MODEL, ROUNDING = "pixel noise", "fixed pattern", "model error", "rounding"
 BIAS = "bias by "  # and what its correction is not sure of
+TOGETHER = "telecentricity x depth"
 TEMPERATURE, EXPANSION = "temperature_K", "expansion_per_K"
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length
 
@@ -53,6 +54,7 @@ def terms(
     *,
     biased: bool,
     doubts: Mapping[str, np.ndarray] | None = None,
+    together: np.ndarray | None = None,
 ) -> list[list[Term]]:
     """Of each of M quantities.
 
@@ -68,6 +70,8 @@ def terms(
         Whether straight edges have the classic locators' bias.
     doubts : dict of str to ndarray, shape (M,), optional
         Where biases have been taken off: standard uncertainties of that by source, in place of all bias.
+    together : ndarray, shape (M,), optional
+        Standard uncertainties by what two inputs do together (`planner.budgeting.products`).
     """
     scene, known = pictures.scene, measurands(pictures)
     pattern = _pattern(pictures, known) if scene.uncertainty.fixed_pattern else np.zeros(len(variances))
@@ -76,6 +80,8 @@ def terms(
         noise = float(np.sqrt(variances[m]))
         rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), each.unit, 1.0, "noise")]
         rows += _of_bias(known, m, each, noise, biases, biased) if doubts is None else _of_doubts(doubts, m, each.unit)
+        if together is not None and together[m] > 0:
+            rows.append(Term(TOGETHER, 0.0, Uncertain(sd=float(together[m])), each.unit, 1.0))
         if pattern[m] > 0:
             rows.append(Term(PATTERN, 0.0, Uncertain(sd=float(pattern[m])), each.unit, 1.0))
         found.append(rows + _stated(scene, each))

@@ -229,7 +229,7 @@ def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str,
     good &= known.view.visible.all(-1) & np.isfinite(sensor_part).all((-1, -2, -3))
     light_part = _light_part(scene, known.view.names, lights, model)
     slack = 1 - _MARGIN * np.sign(sensor_part * light_part.mean(0))  # less where it adds, more where it takes away
-    seen = facing(scene.solid, pictures.sensor_at[good])
+    seen = facing(scene.solid, pictures.viewpoint[good])
     kinds, classes = np.unique(seen, axis=0, return_inverse=True)
     first = [int(np.flatnonzero(good)[np.argmax(classes == k)]) for k in range(len(kinds))]
     strength = [_strengths(scene, known.view.names, sensors[k], lights, model) for k in first]

@@ -62,7 +62,7 @@ def brightest(pictures: Pictures) -> float:
         return float(found)
     faces = solid.triangle_faces[shown]
     levels = face_signal(pictures, solid.triangles[shown].mean(1), faces, 1)
-    return float(max(found, np.where(facing(solid, pictures.sensor_at)[..., faces], levels, 0.0).max()))
+    return float(max(found, np.where(facing(solid, pictures.viewpoint)[..., faces], levels, 0.0).max()))
 
 
 def sides(pictures: Pictures, *, fall_off: bool = True) -> Sides:
@@ -75,7 +75,7 @@ def _sides(pictures: Pictures, fall_off: bool) -> Sides:
     points = edge_points(solid, names, _FRACTIONS)
     faces = np.array([solid.edge(name).faces for name in names])
     inner = points[:, None] + _inward(scene, faces)[:, :, None]
-    seen = facing(solid, pictures.sensor_at)[..., faces, None]
+    seen = facing(solid, pictures.viewpoint)[..., faces, None]
     here = [
         np.where(seen, face_signal(pictures, p, faces[:, :, None], 3, fall_off=fall_off), 0.0)
         for p in (np.broadcast_to(points[:, None], inner.shape), inner)
@@ -201,8 +201,8 @@ def _inward(scene: Scene, faces: np.ndarray) -> np.ndarray:
 
 def background(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     """Where the sensor sees the floor behind points (E, n, 3); NaN where it does not, scene units, (S, E, n, 3)."""
-    places = pictures.sensor_at[:, None, None]
-    rays = points - places
+    view = pictures.viewpoint.widened(2)
+    places, rays = view.origins(points), -view.towards(points)
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = (pictures.scene.floor.height - places[..., 2]) / rays[..., 2]
     return np.where((reach > 0)[..., None], places + reach[..., None] * rays, np.nan)

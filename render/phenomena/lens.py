@@ -61,7 +61,7 @@ class DepthOfField(Effect):
     switch = "a thin lens instead of a pinhole; random, so edge pixels cannot be singled out"
 
     def absent(self, pictures: Pictures) -> str | None:
-        return "the aperture is a pinhole" if pictures.scene.camera.lens.aperture_radius == 0 else None
+        return "the aperture is a pinhole" if pictures.scene.camera.aperture_radius == 0 else None
 
     def influence(self, pictures: Pictures) -> Influence:
         """A disc of radius r adds r^2 / 4 to the blur; it is an even blur only as far as r is small beside it.
@@ -82,4 +82,4 @@ class DepthOfField(Effect):
         return largest(bias, (1 + added / own) ** 3 - 1)
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "camera", lens=scene.camera.lens.model_copy(update={"aperture_radius": 0.0}))
+        return scene.model_copy(update={"camera": scene.camera.stopped_down()})

@@ -26,7 +26,8 @@ class AttachedShadow(Effect):
         """Without it a face would be lit through the object."""
         found = sides(pictures)
         planes = np.einsum("efi,ei->ef", found.normals, found.points[:, 0])
-        seen = np.einsum("efi,si->sef", found.normals, pictures.sensor_at) > planes
+        view = pictures.viewpoint
+        seen = np.einsum("efi,si->sef", found.normals, view.at) > view.share * planes
         away = (np.einsum("efi,...i->...ef", found.normals, emitter.at) < planes for emitter in pictures.emitters)
         return EVERYTHING if any((seen & each).any() for each in away) else NOTHING
 
@@ -129,7 +130,7 @@ class Texture(Effect):
         scene = pictures.scene
         variance = compare(pictures, self.without(scene)).variance
         contrasts = [2 * each.contrast for each in scene.textures if each.kind == "statistical"]
-        seen = facing(scene.solid, pictures.sensor_at).reshape(-1, len(scene.solid.normals)).any(0)
+        seen = facing(scene.solid, pictures.viewpoint).reshape(-1, len(scene.solid.normals)).any(0)
         contrasts += [float(np.abs(sheet.values - 1).max()) for face, sheet in printed(scene).items() if seen[face]]
         poses = (pictures.sensors, *pictures.lights)
         moved = []

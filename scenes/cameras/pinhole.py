@@ -111,6 +111,10 @@ class Camera(Model):
         """Radius of the cone of light that a point in focus sends through the lens, at ``distance`` [length]."""
         return self.lens.aperture_radius
 
+    def stopped_down(self) -> Self:
+        """The same with an aperture of no size."""
+        return self.model_copy(update={"lens": self.lens.model_copy(update={"aperture_radius": 0.0})})
+
     def divisor(self, depth: Any) -> Any:
         """What ``focal_px`` is divided by for the px of a unit length at a depth along the axis, scene units."""
         share = self.perspective

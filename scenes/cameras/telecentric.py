@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from scenes.cameras.kinds import CAMERAS
 from scenes.cameras.pinhole import Camera, is_positive
+from scenes.errors import given as told
 from scenes.ranges import NotNegative, Positive
 from scenes.units import Unit, in_unit
 
@@ -27,7 +28,7 @@ class Telecentric(Camera):
     ``distance``; it is no focal length. ``distance`` is the lens' working distance, at which it is focused.
     """
 
-    kind: Literal["telecentric"]
+    kind: Literal["telecentric"]  # ty: ignore[incompatible-attribute-override]
     """telecentric: all chief rays run along the axis."""
     focal_px: Annotated[float, Field(ge=1e-3, le=1e12)]
     """Magnification over the pixel pitch, times ``distance``: follows from the magnification [px]."""
@@ -69,8 +70,9 @@ class Telecentric(Camera):
         sqrt(2) lambda / (2 pi A) (Zhang, Zerubia and Olivo-Marin 2007, two-dimensional, paraxial).
         """
         magnification, distance = camera.get("magnification"), camera.get("distance")
-        if not (is_positive(magnification) and is_positive(distance)):
-            return {}
+        for key, value in (("magnification", magnification), ("distance", distance)):
+            if not is_positive(value):
+                raise ValueError(f"camera.{key} must be a number greater than 0, got {told(value)}")
         if camera.get("focal_length_mm") is not None:
             raise ValueError("camera.focal_length_mm must be left out with magnification, got it")
         if pitch_um is None:
@@ -104,6 +106,10 @@ class Telecentric(Camera):
     def aperture_radius(self) -> float:
         """Radius of the cone of light at the working distance: the numerical aperture's [length]."""
         return self.distance * self.numerical_aperture / math.sqrt(1 - self.numerical_aperture**2)
+
+    def stopped_down(self) -> Self:
+        """The same with an aperture of no size."""
+        return self.model_copy(update={"numerical_aperture": 0.0})
 
     def moved_to(self, distance: float) -> Self:
         """The same camera elsewhere on its axis: the field where it now looks is as large as the lens makes it."""

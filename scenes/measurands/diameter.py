@@ -15,10 +15,14 @@ class Diameter(MeasurandKind):
     qif = "Diameter"
 
     def in_image(self, seen, quantity) -> Evaluated:
-        """Of the diameter that is parallel to the image: 2 r f / z, z the depth of the centre; no foreshortening."""
+        """Of the diameter that is parallel to the image: 2 r f / z, z the depth of the centre; no foreshortening.
+
+        Of a camera that is no pinhole z is its divisor there, which changes with the depth by the share of perspective.
+        """
         _, centre, radius, number = seen.circle(quantity.features[0])
-        per_length = seen.camera.focal_px / seen.depth(centre.at)
-        forward = -2 * (radius * per_length / seen.depth(centre.at))[..., None] * seen.axes.forward
+        over, share = seen.divisor(centre.at), seen.camera.perspective
+        per_length = seen.camera.focal_px / over
+        forward = -2 * share * (radius * per_length / over)[..., None] * seen.axes.forward
         return Evaluated(2 * radius * per_length, {**pulled([(forward, centre.moves)]), number: 2 * per_length})
 
     def on_plane(self, seen, quantity) -> Evaluated:

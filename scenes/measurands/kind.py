@@ -152,7 +152,7 @@ def plane(seen: Any, quantity: Quantity) -> np.ndarray:
     That of `plane_of`; where that is none, the plane through both points that faces the sensor most.
     """
     points = points_of(seen.solid, quantity)
-    ray = points.mean(0) - seen.eye
+    ray = -seen.viewpoint.towards(points.mean(0))
     normal = plane_of(seen.solid, quantity)
     if normal is None:
         along = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])

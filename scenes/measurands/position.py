@@ -60,24 +60,20 @@ def _coordinate(seen, quantity, scale: np.ndarray | float) -> Evaluated:
 def _level(seen, quantity) -> Point:
     """A ball's centre along the line of sight to it, at the height that the scene gives it."""
     curved, found, _, _ = seen.circle(quantity.features[0])
-    sight = found.at - seen.eye
-    reach = (curved.centre[2] - seen.eye[..., 2]) / sight[..., 2]
+    sight = -seen.viewpoint.towards(found.at)
+    reach = (curved.centre[2] - found.at[..., 2]) / sight[..., 2]
+    wider = 1 + seen.viewpoint.share * reach
     moves = {
-        k: reach[..., None] * (move - sight * (move[..., 2] / sight[..., 2])[..., None])
+        k: wider[..., None] * (move - sight * (move[..., 2] / sight[..., 2])[..., None])
         for k, move in found.moves.items()
     }
-    return Point(seen.eye + reach[..., None] * sight, moves)
+    return Point(found.at + reach[..., None] * sight, moves)
 
 
 def _scale(seen, quantity) -> np.ndarray:
     """Image of a unit length along the scene's x or y at a ball's centre, px: coordinates in the image are along it."""
-    centre, axes = seen.solid.round(quantity.features[0].surface).centre, seen.axes
-    z, step = seen.depth(centre), np.eye(3)[quantity.axis]
-    screen, away = np.stack([axes.right, axes.down], -2), centre - seen.eye
-    slid = seen.camera.focal_px * (
-        screen @ step - (screen @ away[..., None])[..., 0] * (axes.forward @ step)[..., None] / z[..., None]
-    )
-    return np.linalg.norm(slid, axis=-1) / z
+    centre = seen.solid.round(quantity.features[0].surface).centre
+    return np.linalg.norm(seen.slid(centre, np.eye(3)[quantity.axis]), axis=-1)
 
 
 MEASURANDS.add("position")(Position())

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenes.parts.surfaces import Cone, Cylinder, Sphere, axes_beside
+from scenes.viewpoint import Viewpoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +48,13 @@ class Curved:
         """Between axis and wall, rad; 0 but for a cone."""
         return math.radians(self.surface.half_angle_deg) if isinstance(self.surface, Cone) else 0.0
 
-    def sideways(self, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Two directions (..., 3) across the line of sight from an eye (..., 3), by which its place is told.
+    def sideways(self, eye: Viewpoint | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Two directions (..., 3) across the line of sight from an eye (...), by which its place is told.
 
         A sphere's centre is shifted along both. A cylinder's axis, which runs to nowhere in the image, is shifted along
         the first, across the axis too; the second is 0, for the axis turns.
         """
-        sight = self.centre - eye
+        sight = -Viewpoint.of(eye).towards(self.centre)
         if isinstance(self.surface, Sphere):
             sight = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
             helper = np.eye(3)[np.abs(sight).argmin(-1)]
@@ -64,8 +65,8 @@ class Curved:
         size = np.linalg.norm(one, axis=-1, keepdims=True)
         return one / np.where(size > 0, size, np.nan), np.zeros_like(one)
 
-    def parameters(self, eye: np.ndarray) -> np.ndarray:
-        """The surface's own p parameters for one of those by which it is found, from an eye (3,), (p, count).
+    def parameters(self, eye: Viewpoint | np.ndarray) -> np.ndarray:
+        """The surface's own p parameters for one of those by which it is found, from one eye, (p, count).
 
         Both shifts of `sideways`, of a cylinder or cone the first and a turn of the axis (rad) that way; then the
         radius; of a cone then its half angle (rad). The distance from the eye is held.
@@ -82,7 +83,7 @@ class Curved:
             found[self.surface.parameters.index("half_angle"), 3] = 1.0
         return found
 
-    def moved(self, eye: np.ndarray, errors: tuple[float, ...]) -> Curved:
+    def moved(self, eye: Viewpoint | np.ndarray, errors: tuple[float, ...]) -> Curved:
         """The same with errors of these."""
         one, two = self.sideways(eye)
         place = self.centre + errors[0] * one

@@ -28,6 +28,7 @@ from tests.proofs.photographs import photographs
 from tests.proofs.processed import processed
 from tests.proofs.rate import rate
 from tests.proofs.stations import stations
+from tests.proofs.telecentric import telecentric
 from tests.proofs.uneven import uneven
 from tests.proofs.usable import usable
 from tests.proofs.varied import varied
@@ -60,6 +61,7 @@ app.command()(uneven)
 app.command()(usable)
 app.command()(varied)
 app.command()(stations)
+app.command()(telecentric)
 
 if __name__ == "__main__":
     app()

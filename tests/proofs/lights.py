@@ -66,9 +66,10 @@ def compare(name: str, scene: Scene, places: int, rays: int, rng: np.random.Gene
         at = [int(rng.integers(0, n * FINE)) for n in (camera.height, camera.width)]
         found.append([_by_rays(picture, at, rays // 4, seed) for seed in range(4)])
         ways = _ways(picture, at)
+        start = np.broadcast_to(pictures.sensor_at, ways.shape)
         with mock.patch.object(appearance, "light_between", return_value=0.0):  # direct light is compared
-            exact.append(float(seen_by_rays(pictures, ways).mean()))
-        lit = np.array([seen_by_rays(_of_one(pictures, each), ways) > 0 for each in pictures.emitters])
+            exact.append(float(seen_by_rays(pictures, start, ways).mean()))
+        lit = np.array([seen_by_rays(_of_one(pictures, each), start, ways) > 0 for each in pictures.emitters])
         part.append(bool(lit.any() and not lit.all()))
     top, part = max(exact), np.array(part)
     scatter = np.std(found, 1, ddof=1).mean() / 2 / top

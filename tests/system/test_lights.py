@@ -59,7 +59,8 @@ def test_backlight_is_seen_behind_the_object(cone):
     y, x = (part.ravel() for part in np.meshgrid(np.arange(4, 240, 8.0), np.arange(4, 256, 8.0), indexing="ij"))
     right, down = ((part - middle) / camera.focal_px for part, middle in zip((x, y), image_centre(camera), strict=True))
     rays = right[:, None] * axes.right + down[:, None] * axes.down + axes.forward
-    expected = seen_by_rays(Pictures.of(picture), rays)
+    pictures = Pictures.of(picture)
+    expected = seen_by_rays(pictures, np.broadcast_to(pictures.sensor_at, rays.shape), rays)
     shown = image[y.astype(int), x.astype(int)] - scene.noise.dark_level
     bright = camera.exposure * light.intensity
     same = np.abs(shown - np.where(expected > 0.5 * bright, bright, 0.0)) < 0.02 * bright

@@ -81,7 +81,7 @@ def test_faces_come_into_sight_within_six_standard_errors(edge, turns, monkeypat
         return np.array([True, away[0] > edge])
 
     monkeypatch.setattr(sides, "facing", facing)
-    monkeypatch.setattr(sides, "sensor_position", lambda camera, sensor: sensor)
+    monkeypatch.setattr(sides, "viewpoint", lambda camera, sensor: sensor)
     assert sides._turns_away(SimpleNamespace(parameters=parameters), values, 1, which, white) is turns
 
 

@@ -13,6 +13,7 @@ from imaging.features.rim_look import RimLook
 from imaging.features.rim_outline import _crossed, zero_of_steps
 from imaging.pictures import Pictures
 from scenes import Circle
+from scenes.viewpoint import Viewpoint
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,7 @@ def test_a_far_rim_that_is_an_arc_comes_as_near_as_a_whole_one(plate):
         solid = replace(plate.solid, circles=(near, *(c for c in others if c.ends is None)),
                         arcs=tuple(c for c in others if c.ends is not None))  # fmt: skip
         scene = SimpleNamespace(solid=solid, camera=plate.camera)
-        seen = SimpleNamespace(scene=scene, sensors=pictures.sensors, sensor_at=pictures.sensor_at)
+        seen = SimpleNamespace(scene=scene, sensors=pictures.sensors, viewpoint=pictures.viewpoint)
         return rim_sides.clearance(seen, near, angle)
 
     halves = [replace(far, ends=far.centre + far.radius * side * np.array([[0.0, 1, 0], [0.0, -1, 0]]))
@@ -171,7 +172,8 @@ def test_a_limbs_places_near_an_edge_that_is_seen(monkeypatch):
     )
     scene = SimpleNamespace(solid=solid, bodies=SimpleNamespace(is_convex=False), camera=SimpleNamespace(blur_px=1.0),
                             locator=SimpleNamespace(scale_px=1.0))  # fmt: skip
-    pictures = SimpleNamespace(scene=scene, sensor_at=np.array([[0, 0, 90.0], [0, 0, 80.0]]), sensors=np.zeros((2, 2)))
+    eyes = Viewpoint(np.array([[0, 0, 90.0], [0, 0, 80.0]]))
+    pictures = SimpleNamespace(scene=scene, viewpoint=eyes, sensors=np.zeros((2, 2)))
     outline = SimpleNamespace(at=at, arc=np.array([1.0, 2.0, np.nan, 3.0]))
     look = SimpleNamespace(good=np.array([[True, False, True, True]] * 2), squared=np.full((2, 4), 9.0))
     found = limb_look.clear_of_others(pictures, None, outline, look)

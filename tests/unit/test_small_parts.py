@@ -7,7 +7,9 @@ import pytest
 
 import measure
 import planner
-from imaging.geometry.projection import frame, project, project_ideal, sensor_position
+from imaging.features.seen import Seen
+from imaging.geometry.lens import image_centre
+from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
 from planner.budgeting import plans
 from planner.search import lights
@@ -28,11 +30,9 @@ from validation.report import sharpness
 def test_a_unit_length_at_a_ball_is_as_long_as_its_ends_images_are_apart(task1, pose, axis):
     """Well off the camera's axis, by differences of the projection."""
     centre, pose, step = np.array([4.0, -7.0, 3.0]), np.array(pose), 1e-5 * np.eye(3)[axis]
-    eye, axes = sensor_position(task1.camera, pose), frame(pose)
-    seen = SimpleNamespace(
-        solid=SimpleNamespace(round=lambda name: SimpleNamespace(centre=centre)),
-        axes=axes, eye=eye, camera=task1.camera, depth=lambda place: (place - eye) @ axes.forward,
-    )  # fmt: skip
+    ball = SimpleNamespace(round=lambda name: SimpleNamespace(centre=centre))
+    seen = Seen(ball, task1.camera, pose, (), np.empty((0, 2)), np.empty((0, 2)), {}, (), np.empty((0, 3)),
+                np.empty(0), np.empty(0), expected=True)  # fmt: skip
     quantity = SimpleNamespace(axis=axis, features=[SimpleNamespace(surface="ball")])
     ends = project_ideal(np.array([centre + step, centre - step]), pose, task1.camera)
     assert position._scale(seen, quantity) == pytest.approx(np.linalg.norm(ends[0] - ends[1]) / 2e-5, rel=1e-6)
@@ -41,13 +41,11 @@ def test_a_unit_length_at_a_ball_is_as_long_as_its_ends_images_are_apart(task1, 
 def test_what_lies_beside_an_object_is_seen_at_the_images_first_corner(task1, monkeypatch):
     """The outer corner of the first pixel."""
     pictures, asked = Pictures.of(Picture.of(task1, (35, 130), (20, 40))), []
-    monkeypatch.setattr(preview, "seen_by_rays", lambda pictures, rays: asked.append(rays) or np.array([7.5, 1.0]))
+    monkeypatch.setattr(preview, "seen_at", lambda pictures, image: asked.append(image) or np.array([7.5, 1.0]))
     assert preview._beside(pictures, task1) == 7.5
-    (rays,) = asked
-    assert rays.shape == (1, 3)
-    place = sensor_position(task1.camera, pictures.sensors) + rays[0]
-    assert project(place[None], pictures.sensors, task1.camera)[0] == pytest.approx([-0.5, -0.5], abs=1e-6)
-    assert rays[0] @ frame(pictures.sensors).forward == pytest.approx(task1.camera.focal_px)
+    (image,) = asked
+    assert image.shape == (1, 2)
+    assert image[0] + image_centre(task1.camera) == pytest.approx([-0.5, -0.5], abs=1e-12)
 
 
 @pytest.mark.parametrize(("size", "count"), [((1024, 1024), 10), ((1025, 1024), 0), ((64, 48), 10), ((1, 1 << 21), 0)])

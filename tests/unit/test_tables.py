@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from render import texture
+from scenes.viewpoint import Viewpoint
 
 
 def shade(_, normal, points, material):
@@ -119,7 +120,7 @@ def test_no_lobe_falls_between_two_nodes(roughness, counts):
 
     Light and sensor at 10 over the face, 4 apart: the slope is that of the half vector, by brute force.
     """
-    pictures = SimpleNamespace(lights_at=[np.array([2.0, 1.0, 10.0])], sensor_at=np.array([-2.0, 1.0, 10.0]))
+    pictures = SimpleNamespace(lights_at=[np.array([2.0, 1.0, 10.0])], viewpoint=Viewpoint(np.array([-2.0, 1.0, 10.0])))
     corner, sides = np.array([-6.0, -3.0, 0.0]), np.array([[12.0, 0, 0], [0, 6.0, 0]])
 
     def at(across, down):
@@ -129,7 +130,7 @@ def test_no_lobe_falls_between_two_nodes(roughness, counts):
     u = np.linspace(0, 1, 17)
     points = at(u, u)
     half = sum((p - points) / np.linalg.norm(p - points, axis=-1, keepdims=True) for p in
-               (pictures.lights_at[0], pictures.sensor_at))  # fmt: skip
+               (pictures.lights_at[0], pictures.viewpoint.at))  # fmt: skip
     slope = half[..., :2] / half[..., 2:]
     steps = [np.linalg.norm(np.diff(slope, axis=axis), axis=-1).max() for axis in (1, 0)]
     assert found == [16 * 2 ** max(int(np.ceil(np.log2(step / (roughness / 2)))), 0) for step in steps]

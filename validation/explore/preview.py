@@ -11,9 +11,9 @@ import numpy as np
 
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.lens import image_centre, undistorted
-from imaging.geometry.projection import depth, facing, project, rays
+from imaging.geometry.projection import depth, facing, project, ray_origins, rays
 from imaging.geometry.rays import first_face, has_embree
-from imaging.light.appearance import face_signal, seen_by_rays
+from imaging.light.appearance import face_signal, seen_at
 from imaging.pictures import Pictures
 from imaging.sensor import full_scale
 from planner.prediction import glanced
@@ -67,7 +67,7 @@ def drawn(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
     corners = bodies.triangles.reshape(-1, 3)
     image = (project(corners, pose, scene.camera) - [part.left - 0.5, part.top - 0.5]) * scale - 0.5
     away = depth(corners, pose, scene.camera).reshape(-1, 3).mean(1)
-    seen = facing(bodies, pictures.sensor_at)[bodies.triangle_faces] & np.isfinite(image.reshape(-1, 6)).all(1)
+    seen = facing(bodies, pictures.viewpoint)[bodies.triangle_faces] & np.isfinite(image.reshape(-1, 6)).all(1)
     order = np.argsort(-away)
     order = order[seen[order]]
     levels = np.full(len(away), 0.0)
@@ -92,20 +92,22 @@ def sketched(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
         return drawn(scene, picture, part)
     pictures, scale = glanced(picture), part.scale / _COARSE
     shape = max(1, round(part.height * scale)), max(1, round(part.width * scale))
-    seen = _seen(pictures, part, shape)
-    face, away = first_face(scene.bodies, np.broadcast_to(pictures.sensor_at, seen.shape), seen, ())
+    image = _seen(pictures, part, shape)
+    start, seen = (make(image, pictures.sensors, scene.camera) for make in (ray_origins, rays))
+    face, away = first_face(scene.bodies, start, seen, ())
     met = face >= 0
     canvas = np.full(shape, _beside(pictures, scene), np.float32)
-    canvas[met] = face_signal(pictures, pictures.sensor_at + away[met][:, None] * seen[met], face[met], 1)
+    canvas[met] = face_signal(pictures, start[met] + away[met][:, None] * seen[met], face[met], 1)
     return shades(scene, _blurred(canvas, scene.camera.blur_px * scale) + scene.noise.dark_level)
 
 
 def _seen(pictures: Pictures, part: Window, shape: tuple[int, int]) -> np.ndarray:
-    """Directions in which one picture's sensor looks through pixels of so many rows and columns, shape (h, w, 3)."""
+    """Where one picture's sensor looks through pixels of so many rows and columns: ideal px from the image's middle,
+    shape (h, w, 2)."""
     camera = pictures.scene.camera
     y, x = ((np.arange(n) + 0.5) * size / n - 0.5 for n, size in zip(shape, (part.height, part.width), strict=True))
     places = np.stack(np.meshgrid(part.left + x, part.top + y), -1)
-    return rays(undistorted(places, camera) - image_centre(camera), pictures.sensors, camera)
+    return undistorted(places, camera) - image_centre(camera)
 
 
 def _blurred(canvas: np.ndarray, sigma: float) -> np.ndarray:
@@ -115,8 +117,7 @@ def _blurred(canvas: np.ndarray, sigma: float) -> np.ndarray:
 
 def _beside(pictures: Pictures, scene: Scene) -> float:
     """Signal of what lies beside the object: that of the image's first corner."""
-    corner = rays(-0.5 - image_centre(scene.camera), pictures.sensors, scene.camera)
-    return float(seen_by_rays(pictures, corner[None])[0])
+    return float(seen_at(pictures, -0.5 - image_centre(scene.camera)[None])[0])
 
 
 def rendered(scene: Scene, image: np.ndarray, part: Window) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from imaging.features.projected_edges import circles, projected_edges
 from imaging.geometry.lens import recorded
-from imaging.geometry.projection import facing, project
+from imaging.geometry.projection import depth, facing, project
 from imaging.geometry.visibility import visible_spans
 from imaging.light.appearance import face_signal, is_separable
 from imaging.light.backlight import backlights
@@ -84,24 +84,22 @@ def _seen(plan: Plan, path: Path) -> Path:
 def draw_seen(axis, scene, sensor, light, points) -> None:
     """Draw the object from a sensor: faces by brightness, required edges in colour, points (px) as rings."""
     pictures = Pictures.of(Picture.of(scene, sensor, light))
-    solid, camera, pose, position = scene.solid, scene.camera, pictures.sensors, pictures.sensor_at
+    solid, camera, pose, view = scene.solid, scene.camera, pictures.sensors, pictures.viewpoint
     axis.set_facecolor("0.95" if backlights(scene) else "0.05")
-    shown = facing(solid, position)
-    levels = face_signal(pictures, solid.triangles.mean(1), solid.triangle_faces, 1)
+    shown, middles = facing(solid, view), solid.triangles.mean(1)
+    levels = face_signal(pictures, middles, solid.triangle_faces, 1)
     brightest = max(levels.max(), np.finfo(float).tiny)
     corners = project(solid.triangles.reshape(-1, 3), pose, camera).reshape(-1, 3, 2)
-    away = np.linalg.norm(solid.triangles.mean(1) - position, axis=1)
-    for k in np.argsort(-away):
+    for k in np.argsort(-depth(middles, pose, camera)):
         face = solid.triangle_faces[k]
         if shown[face]:
             grey = str(0.08 + 0.85 * levels[k] / brightest)
             axis.fill(*corners[k].T, color=grey, lw=0.8, ec=grey)
     for edge in (edge for edge in solid.edges if edge.kind != "smooth"):
-        for span in visible_spans(scene.bodies, edge, position):
+        for span in visible_spans(scene.bodies, edge, view):
             _segment(axis, scene, pose, edge, span, color="0.5", lw=0.7)
-    view = projected_edges(pictures)
-    for i, name in enumerate(view.names):
-        for span in visible_spans(scene.bodies, solid.edge(name), position):
+    for i, name in enumerate(projected_edges(pictures).names):
+        for span in visible_spans(scene.bodies, solid.edge(name), view):
             _segment(axis, scene, pose, solid.edge(name), span, color=f"C{i % 10}", lw=2.5, label=name)
     for name in circles(scene):
         _rim(axis, scene, pose, solid.circle(name))

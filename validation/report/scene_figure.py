@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.collections import PolyCollection
 
-from imaging.geometry.projection import facing, project
+from imaging.geometry.projection import depth, facing, project
 from imaging.geometry.visibility import visible_spans
 from planner import Pictures
 from scenes import Circle, Edge, Pose, Scene
@@ -102,7 +102,7 @@ class _View:
 
     def __init__(self, scene: Scene, sensor: Pose) -> None:
         pictures = Pictures.of(scene, list(sensor))
-        self.scene, self.pose, self.position = scene, pictures.sensors, pictures.sensor_at
+        self.scene, self.pose, self.viewpoint = scene, pictures.sensors, pictures.viewpoint
         self._spans: dict[str, list[tuple[float, float]]] = {}
         self.names: list[_Name] = []
 
@@ -113,18 +113,17 @@ class _View:
     def spans(self, edge: Edge) -> list[tuple[float, float]]:
         """The visible parts of an edge."""
         if edge.name not in self._spans:
-            self._spans[edge.name] = visible_spans(self.scene.bodies, edge, self.position)
+            self._spans[edge.name] = visible_spans(self.scene.bodies, edge, self.viewpoint)
         return self._spans[edge.name]
 
 
 def _faces(axis, view: _View) -> None:
     """Faces that are turned to the sensor, the farthest first, brighter where they face it."""
     solid = view.scene.solid
-    shown, middles = facing(solid, view.position), solid.triangles.mean(1)
+    shown, middles = facing(solid, view.viewpoint), solid.triangles.mean(1)
     corners = view.image(solid.triangles.reshape(-1, 3)).reshape(-1, 3, 2)
-    away = view.position - middles
-    far = np.linalg.norm(away, axis=1)
-    cosines = np.abs(np.einsum("ti,ti->t", solid.normals[solid.triangle_faces], away)) / far
+    away, far = view.viewpoint.towards(middles), depth(middles, view.pose, view.scene.camera)
+    cosines = np.abs(np.einsum("ti,ti->t", solid.normals[solid.triangle_faces], away)) / np.linalg.norm(away, axis=1)
     order = np.argsort(-far, kind="stable")
     order = order[shown[solid.triangle_faces[order]]]
     greys = [str(grey) for grey in 0.55 + 0.37 * cosines[order]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE
+from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE, TOGETHER
 
 ALL = "all sources"  # of a correction's uncertainty together, where a run knows no more than their sum
 _WORDS = {
@@ -16,6 +16,9 @@ _WORDS = {
     ROUNDING: "rounding of the value",
     TEMPERATURE: "temperature of the part",
     EXPANSION: "thermal expansion of the part",
+    TOGETHER: "telecentricity and depth together",
+    "camera.telecentricity_deg": "telecentricity of the lens",
+    "camera.magnification": "magnification", "camera.flange_mm": "sensor's distance from the lens",
     "sensor_distance": "distance of the camera",
     "sensor_roll_deg": "turn of the camera about its axis",
     "camera.distance": "distance of the camera",

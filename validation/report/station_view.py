@@ -10,11 +10,12 @@ import numpy as np
 from markupsafe import Markup
 from scipy.optimize import linear_sum_assignment
 
-from imaging.geometry.projection import project, sensor_position
+from imaging.geometry.projection import project, viewpoint
 from scenes import Centre, Curved, Picture, Side, Wall
 from scenes.measurands.features import Between, ends_of, is_line, point_of
 from scenes.measurands.measurands import Quantity
 from scenes.parts.surfaces import Sphere
+from scenes.viewpoint import Viewpoint
 from validation.explore import preview
 from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.grades import LOOKS
@@ -95,12 +96,12 @@ def _outline(picture: Picture, feature) -> list[np.ndarray]:
     if isinstance(feature, Centre):
         return [_seen(picture, preview.ring(solid.circle(feature.circle), _CHORDS))]
     if isinstance(feature, Wall):
-        eye = sensor_position(picture.scene.camera, np.array(list(picture.sensor)))
+        eye = viewpoint(picture.scene.camera, np.array(list(picture.sensor)))
         return [_seen(picture, line) for line in _limb(solid.round(feature.surface), eye)]
     return []
 
 
-def _limb(wall: Curved, eye: np.ndarray) -> list[np.ndarray]:
+def _limb(wall: Curved, eye: Viewpoint) -> list[np.ndarray]:
     """What an eye sees a curved surface end at, about: a circle of a sphere; of others a line on both sides, and what
     is between them."""
     one, two = wall.sideways(eye)

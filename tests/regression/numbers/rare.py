@@ -21,6 +21,7 @@ from planner.uncertainty.groups import Group, draw
 from planner.uncertainty.ufloats import as_ufloats
 from scenes import Noise, Picture, Pose, Tolerance
 from scenes.parts.surfaces import Torus, axes_beside
+from scenes.viewpoint import Viewpoint
 from tests.curved import SURFACES
 from tests.regression.numbers.poses import load, uneven, without_error
 from tests.regression.stored import CLOSED, SEARCHED
@@ -73,7 +74,7 @@ def _tori():
     found = {}
     for name, away in eyes.items():
         for kind, each in (("torus", torus), ("hollow", hole)):
-            status, branches = tori.torus_branches(each, each.centre + away)
+            status, branches = tori.torus_branches(each, Viewpoint(each.centre + away))
             found[f"{name} {kind}"] = [status, [[b.middle, b.half, b.side, b.points(u)] for b in branches]]
     return found
 
