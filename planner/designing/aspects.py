@@ -90,7 +90,7 @@ def _extremes(aside: np.ndarray, towards: np.ndarray) -> Iterable[tuple[float, f
 
 def aspects(scene: Scene, poses: Iterable[Pose] = ()) -> tuple[Aspect, ...]:
     """Of the scene's settings, from straight above (or below), and of further poses: upright and on its side each."""
-    low, high = same_side([each.sensor for each in scene.settings[:1]])
+    low, _ = same_side([each.sensor for each in scene.settings[:1]])
     pole = Pose(180.0 if low >= 90 else 0.0, 0.0)
     wanted = dict.fromkeys([*poses, *(each.sensor for each in scene.settings), pole])
     points = measured_points(scene)

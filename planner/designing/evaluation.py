@@ -72,7 +72,9 @@ class Problem:
             space = np.array([np.ravel([list(pose) for pose in each.lights]) for each in scene.settings])
         lights = [light.distance for light in scene.lights if not light.faces_sensor]
         default = in_unit(lights[0] if lights else scene.camera.distance, scene.units, "mm")
-        return cls(scene, wishes, allowed(scene, wishes), aspects(scene, poses), space, _own_blur(scene, wishes), default)
+        return cls(
+            scene, wishes, allowed(scene, wishes), aspects(scene, poses), space, _own_blur(scene, wishes), default
+        )
 
 
 def _own_blur(scene: Scene, wishes: Wishes) -> float:

@@ -140,7 +140,9 @@ def electrons_per_s(sensor: ListedSensor, lens: ListedLens, number: float, light
     return on_sensor * area * photons_per_joule(light.photon_nm) * sensor.quantum_efficiency
 
 
-def light_distance(light: ListedLight, at: Placed, aspect: Aspect, telecentric: bool, default_mm: float) -> float | None:
+def light_distance(
+    light: ListedLight, at: Placed, aspect: Aspect, telecentric: bool, default_mm: float
+) -> float | None:
     """From the reference point; None where it would stand in the way of the camera.
 
     The hole of a light at the camera has to show all that is measured; it stands as near to the middle of the distances

@@ -1,9 +1,9 @@
-"""The station of least cost that meets a drawing, and what less U costs: all combinations of a catalogue, most by bounds.
+"""The station of least cost that meets a drawing, and what less U costs, among all combinations of a catalogue.
 
-Combinations come in the order of their cost. What cannot be is left out by what makes it impossible, for many at once:
-entries that contradict themselves or lack something, parts that another dominates, pairs of sensor and lens that do not
-fit or whose least noise is too much. What is left is rated at a glance from a few places (`evaluation.rate`), and looked
-at closely where it meets the requirements, until the first does.
+Combinations come in the order of their cost; a pair of camera and lens takes the first light that does. What cannot be
+is left out by what makes it impossible, for many at once: entries that contradict themselves or lack something, parts
+that another dominates, pairs that do not fit or whose least noise is too much. What is left is rated at a glance from a
+few places (`evaluation.rate_light`), and looked at closely where it meets the requirements, until the first does.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from planner.designing.dominance import of_lens, of_light, of_sensor, undominate
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, Viewed, floor, rate_light, views
 from planner.designing.stations import station
 from scenes import InvalidInput, Scene
-from scenes.catalogue import Catalogue, Entry, ListedLens, ListedLight, ListedSensor
+from scenes.catalogue import Catalogue, Entry, ListedLens, ListedSensor
 
 Report = Callable[[str, int, int], None]
 CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, BUDGET, DOMINATED = (
@@ -32,7 +32,7 @@ CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, BUDGET, DOMINATED = (
 )  # fmt: skip
 PLACES = "places in the image"
 MOST_RATED = 20_000  # pairs that are rated at most, before the search gives up
-_BESIDE = 60  # pairs that are rated for the front beyond the cheapest that does
+_BESIDE = 24  # pairs that are rated for the front beyond the cheapest that does
 _TOGETHER = 16  # pairs whose views are found at a time
 _BETTER = 0.98  # of the ratio before: what is worth more cost
 _SHOWN = 12  # of the front
@@ -269,9 +269,7 @@ class _Search:
         if not self.catalogue.priced:
             pixels = np.array([float(np.prod(each.resolution)) / 1e6 for each in self.sensors])
             return np.repeat(pixels[:, None], len(self.lenses), 1)
-        return np.add.outer(
-            *(np.array([each.price for each in some], float) for some in (self.sensors, self.lenses))
-        )
+        return np.add.outer(*(np.array([each.price for each in some], float) for some in (self.sensors, self.lenses)))
 
     def _light_cost(self, number: int) -> float:
         return (self.lights[number].price or 0.0) if self.catalogue.priced else 0.0
@@ -336,7 +334,8 @@ class _Search:
         else:
             self.offers.append(offer)
             offer = self._probed(offer)
-        further = number + 1 < len(self.lights) and not (offer is not None and beaten)
+        done = offer is not None and (beaten or offer.ratio <= 1)
+        further = number + 1 < len(self.lights) and not done
         if further:
             more = cost - self._light_cost(number) + self._light_cost(number + 1)
             if more <= (self.problem.wishes.budget or math.inf):

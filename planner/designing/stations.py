@@ -11,9 +11,9 @@ from pydantic import TypeAdapter
 from planner.constraints import same_side
 from planner.designing.optics import Settings
 from scenes import Scene
+from scenes.cameras import AnyCamera
 from scenes.cameras.covariance import Covariance
 from scenes.cameras.data_sheet import completed
-from scenes.cameras import AnyCamera
 from scenes.catalogue import ListedSensor
 from scenes.uncertain import UncertainNumber
 
@@ -87,7 +87,7 @@ def noise_of(sensor: ListedSensor, prnu: float) -> dict[str, Any]:
 
 
 def carried(told: Covariance, before: Any, after: Any) -> Covariance:
-    """A calibration's covariance for another camera that is calibrated as well, with errors as large in px at the corner.
+    """A calibration's covariance for another camera that is calibrated as well: its errors at the corner stay in px.
 
     A stretch fx moves the corner by R / f, a principal point by 1, k1 by f (R / f)^3, k2 by f (R / f)^5, k3 by
     f (R / f)^7, p1 and p2 by f (R / f)^2.

@@ -71,7 +71,9 @@ class Wishes:
             if value is not None and not 0 < value <= most:
                 raise InvalidInput(f"{name} must be above 0 and at most {most:g}, got {value}")
         if not self.nearest_mm < self.farthest_mm:
-            raise InvalidInput(f"nearest_mm must be less than farthest_mm {self.farthest_mm:g}, got {self.nearest_mm:g}")
+            raise InvalidInput(
+                f"nearest_mm must be less than farthest_mm {self.farthest_mm:g}, got {self.nearest_mm:g}"
+            )
 
     @property
     def coverage(self) -> float:

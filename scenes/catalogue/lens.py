@@ -153,7 +153,11 @@ class ListedLens(Entry):
         if None in (self.f_number, self.magnification):
             return
         made = self.magnification / (2 * self.f_number)
-        wide = _NA * made + _last_digit(self.numerical_aperture) + made * _last_digit(self.magnification) / self.magnification
+        wide = (
+            _NA * made
+            + _last_digit(self.numerical_aperture)
+            + made * _last_digit(self.magnification) / self.magnification
+        )
         yield from self.differs("numerical_aperture", made, ("magnification", "f_number"), wide)
 
     def _field(self) -> Iterator[Contradiction]:

@@ -117,7 +117,7 @@ class ListedLight(Entry):
         return _LIGHT.validate_python(common | table)
 
     def irradiance_at(self, distance_mm: float) -> float | None:
-        """Of a white surface on its axis at a distance; of a backlight pi times its radiance [W / m^2]; None: unknown."""
+        """Of a white surface on its axis; of a backlight pi times its radiance [W / m^2]; None where not known."""
         stated = self._radiance()
         if stated is not None:
             return stated * self._seen(distance_mm)

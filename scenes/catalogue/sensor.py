@@ -114,13 +114,19 @@ class ListedSensor(Entry):
             return
         for side, made, given in zip(("width", "height"), self.size_mm, self.sensor_size_mm or (), strict=False):
             if abs(given - made) > _ROUNDED_MM + _SIZE * made:
-                text = f"sensor_size_mm must have a {side} of {made:.4g} by resolution and pixel_pitch_um, got {given:g}"
+                text = (
+                    f"sensor_size_mm must have a {side} of {made:.4g} by resolution and pixel_pitch_um, got {given:g}"
+                )
                 yield self.against(("sensor_size_mm", "resolution", "pixel_pitch_um"), text)
         wide = _ROUNDED_MM + _SIZE * self.diagonal
         yield from self.differs("diagonal_mm", self.diagonal, ("resolution", "pixel_pitch_um"), wide)
 
     def _emva(self) -> Iterator[Contradiction]:
-        full, dark, least = self.saturation_capacity_e, self.temporal_dark_noise_e, self.absolute_sensitivity_threshold_e
+        full, dark, least = (
+            self.saturation_capacity_e,
+            self.temporal_dark_noise_e,
+            self.absolute_sensitivity_threshold_e,
+        )
         if full is None:
             return
         if least is not None:
