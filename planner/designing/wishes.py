@@ -13,7 +13,7 @@ from planner.uncertainty.risks import Limits, global_risks
 from scenes import InvalidInput, Quantity, Scene
 
 TUR = 4.0  # test uncertainty ratio (ANSI/NCSL Z540.3): what the pages call precise enough
-_LEAST_U, _MOST_U = 1e-6, 10.0  # of half a tolerance zone: between which u is sought
+_LEAST_U, _MOST_U = 1e-6, 0.5  # of half a tolerance zone: between which u is sought; U is then all of it
 MOST = 1e9
 
 

@@ -17,7 +17,7 @@ def efficacy(wavelength_nm: float | None) -> float:
     within 1 % of its peak.
 
     >>> round(efficacy(555)), round(efficacy(625)), efficacy(None)
-    (681, 219, 300.0)
+    (682, 216, 300.0)
     """
     if wavelength_nm is None:
         return WHITE_LM_PER_W
