@@ -12,7 +12,7 @@ import heapq
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -214,19 +214,19 @@ def _unusable(each: Entry, wrong: set[str], priced: bool) -> str:
     return COLOUR if isinstance(each, ListedSensor) and each.colour else ""
 
 
-@dataclass(eq=False)
 class _Search:
-    problem: Problem
-    catalogue: Catalogue
-    report: Report
-    mapped: Callable[..., Any]
-    beside: int
-    most: int
-    offers: list[Offer] = field(default_factory=list)
-    hard: dict[tuple, float] = field(default_factory=dict)
-    seen: dict[int, tuple[Viewed, ...] | str] = field(default_factory=dict)
-    counts: Counter = field(default_factory=Counter)
-    out: Counter = field(default_factory=Counter)
+    """One search as it goes on: what was rated so far, which lights do not show the edges, what was left out."""
+
+    def __init__(
+        self, problem: Problem, catalogue: Catalogue, report: Report, mapped: Callable[..., Any], beside: int, most: int
+    ) -> None:
+        self.problem, self.catalogue, self.report, self.mapped = problem, catalogue, report, mapped
+        self.beside, self.most = beside, most
+        self.offers: list[Offer] = []
+        self.hard: dict[tuple, float] = {}  # of a light's shape: least factor of noise over the bound of its pair
+        self.seen: dict[int, tuple[Viewed, ...] | str] = {}
+        self.counts: Counter = Counter()
+        self.out: Counter = Counter()
 
     def run(self) -> Design:
         kept, out = usable(self.catalogue)
@@ -238,7 +238,8 @@ class _Search:
             if not left:
                 told = ", ".join(f"{count} {why}" for why, count in out[table].items() if count) or "none given"
                 raise InvalidInput(f"catalogue must have {table} that a station can be made of, got {told}")
-        self.sensors, self.lenses, self.lights = kept["sensors"], kept["lenses"], kept["lights"]
+        self.sensors: list[Any] = kept["sensors"]
+        self.lenses, self.lights = kept["lenses"], kept["lights"]
         self.lights = sorted(self.lights, key=lambda each: each.price or 0.0)
         queue = self._queue()
         winner = self._cheapest(queue)

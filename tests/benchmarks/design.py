@@ -55,7 +55,8 @@ def lenses(rng: np.random.Generator, count: int) -> list[ListedLens]:
             scale = float(f"{np.exp(rng.uniform(np.log(0.05), np.log(2))):.3g}")
             found.append(ListedLens(
                 kind="bi-telecentric", magnification=scale, f_number=float(rng.choice([5, 6, 8])),
-                working_distance_mm=round(rng.uniform(65, 400)), telecentricity_deg=float(rng.choice([0.03, 0.05, 0.1])),
+                working_distance_mm=round(rng.uniform(65, 400)),
+                telecentricity_deg=float(rng.choice([0.03, 0.05, 0.1])),
                 price=round((300 + 60 / scale) * factor, 2), **common,
             ))  # fmt: skip
         else:

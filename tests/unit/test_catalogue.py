@@ -43,7 +43,8 @@ def test_the_sample_has_no_contradictions_and_names_its_sources() -> None:
          r"dynamic_range_db must be 72.0 to 73.9 by .*10400.* 2.1, got 65"),
         (ListedSensor, SENSOR, {"absolute_sensitivity_threshold_e": 12.0, "dynamic_range_db": 58.8},
          "absolute_sensitivity_threshold_e must be 2.6 .* got 12"),
-        (ListedSensor, SENSOR, {"sensor_size_mm": (8.45, 7.5)}, "sensor_size_mm must have a height of 7.066 .* got 7.5"),
+        (ListedSensor, SENSOR, {"sensor_size_mm": (8.45, 7.5)},
+         "sensor_size_mm must have a height of 7.066 .* got 7.5"),
         (ListedSensor, SENSOR, {"diagonal_mm": 10.4}, "diagonal_mm must be 11.01 .* got 10.4"),
         (ListedSensor, SENSOR, {"pixel_pitch_um": 0.0}, "pixel_pitch_um must be left out .* got 0"),
         (ListedSensor, SENSOR, {"snr_max_db": 60.0}, "snr_max_db must be 40.17 .* got 60"),
@@ -152,7 +153,8 @@ def test_brightness_is_the_same_in_every_unit() -> None:
     area = math.pi * (50.0**2 - 30.0**2) * 1e-6
     for stated in (
         {"radiance": 80.0}, {"luminance": 80.0 * per_watt}, {"radiant_power": 80.0 * math.pi * area},
-        {"irradiance": wanted, "at_distance_mm": distance}, {"illuminance": wanted * per_watt, "at_distance_mm": distance},
+        {"irradiance": wanted, "at_distance_mm": distance},
+        {"illuminance": wanted * per_watt, "at_distance_mm": distance},
         {"irradiance": 80.0 * math.pi, "at_distance_mm": 0.0},
     ):  # fmt: skip
         assert ListedLight(**RING, **stated).irradiance_at(distance) == pytest.approx(wanted, rel=1e-6)

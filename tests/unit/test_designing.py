@@ -103,9 +103,7 @@ def test_a_part_that_moves_is_exposed_shortly() -> None:
     light = ListedLight(name="spot", kind="spot", outer_diameter_mm=20.0, radiance=50.0)
     camera = found.sensors[0].model_copy(update={"resolution": (1280, 1024), "pixel_pitch_um": 3.45})
     still, fast = (_problem(name="bracket_mm", speed_mm_s=speed) for speed in (0.0, 500.0))
-    one, other = (
-        chosen(camera, lens, light, each.aspects[0], each.wishes, 1.0, 2.0, 300.0) for each in (still, fast)
-    )
+    one, other = (chosen(camera, lens, light, each.aspects[0], each.wishes, 1.0, 2.0, 300.0) for each in (still, fast))
     assert one.fill == pytest.approx(0.7)
     assert other.exposure_s * 500.0 <= other.pixel_mm * (1 + 1e-9)
     assert other.fill < one.fill
@@ -115,7 +113,9 @@ def test_a_part_that_moves_is_exposed_shortly() -> None:
 
 def test_a_calibration_stays_as_good_in_px() -> None:
     """A parameter's error moves the corner of both images by as many px."""
-    one, other = (_problem(name="bracket_mm").scene.camera.tried(focal_px=f, width=w) for f, w in ((8e3, 2448), (5e3, 4096)))
+    one, other = (
+        _problem(name="bracket_mm").scene.camera.tried(focal_px=f, width=w) for f, w in ((8e3, 2448), (5e3, 4096))
+    )
     told = Covariance(names=("fx", "cx", "k1"), matrix=((4.0, 0.1, 0.01), (0.1, 0.2, 0.0), (0.01, 0.0, 1e-4)))
     made = carried(told, one, other)
 
@@ -170,7 +170,9 @@ def test_entries_that_cannot_be_used_are_counted() -> None:
     kept, out = usable(found.model_copy(update={"sensors": (*odd, found.sensors[0])}))
     assert len(kept["sensors"]) == 1 or out["sensors"][CONTRADICTORY]
     assert (out["sensors"][INCOMPLETE], out["sensors"][PRICELESS]) == (1, 1)
-    with pytest.raises(InvalidInput, match="catalogue must have sensors that a station can be made of, got 1 incomplete"):
+    with pytest.raises(
+        InvalidInput, match="catalogue must have sensors that a station can be made of, got 1 incomplete"
+    ):
         design(_problem(), Catalogue(sensors=(odd[1],), lenses=found.lenses, lights=found.lights))
 
 
