@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,7 @@ from validation.budgets import budget_of
 if TYPE_CHECKING:
     from validation.batch.result import Validation
 
+_TRIED = 3  # stations that are rendered, where rendering contradicts the ones before
 _DERIVED = ("distance", "focal_px")  # of a camera's data sheet
 
 
@@ -31,6 +32,8 @@ class Proof:
 
     Attributes
     ----------
+    offer : Offer
+        The station.
     budget : SceneBudget
     ratio : float
         Largest U over what is allowed.
@@ -38,6 +41,7 @@ class Proof:
         Of the noisy pictures, where there are at least two.
     """
 
+    offer: Offer
     budget: SceneBudget
     ratio: float
     run: Validation | None
@@ -74,7 +78,24 @@ def prove(design: Design, offer: Offer, renders: int, report: Any = None) -> Pro
     if renders > 1:
         with TemporaryDirectory() as directory:
             made = run(scene, renders, out=Path(directory) / "run", workers=1, fresh=True, progress=report)
-    return Proof(found, float(ratio), made)
+    return Proof(offer, found, float(ratio), made)
+
+
+def proven(design: Design, renders: int, report: Any = None) -> tuple[Design, tuple[Proof, ...]]:
+    """The design with the first station that rendering bears out: the best, or the next of the front that meet all.
+
+    Without any the design stays as it is, and its proofs say so.
+    """
+    if design.best is None:
+        return design, ()
+    dearer = [each for each in design.front if each.cost >= design.best.cost and each.ratio <= 1]
+    tried = [design.best, *(each for each in dearer if each.rated is not design.best.rated)][:_TRIED]
+    proofs: list[Proof] = []
+    for offer in tried:
+        proofs.append(prove(design, offer, renders, report))
+        if proofs[-1].holds:
+            return replace(design, best=offer), tuple(proofs)
+    return design, tuple(proofs)
 
 
 def write(design: Design, source: str, path: Path) -> Scene:

@@ -2,7 +2,7 @@
 
 A made-up catalogue (seeded) of cameras that share chips, as bought ones do, of lenses of which four fifths are
 telecentric, and of lights of all kinds, with prices. The search's winner has to be the one of all combinations of a
-subset that are rated one by one. ``--cameras``, ``--lenses``, ``--lights``, ``--scene``, ``--k``, ``--seed`` say how much.
+subset that are rated one by one. ``--cameras``, ``--lenses``, ``--lights``, ``--scene``, ``--k``, ``--seed``: how much.
 """
 
 from __future__ import annotations

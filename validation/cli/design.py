@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +14,7 @@ import typer
 
 import scenes
 from scenes import catalogue
+from scenes.status import is_trusted
 from validation.cli.common import Json, SceneName, check_number, commands, progress, say, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 commands = commands()
 _MOST = 1e9
-_SEVERAL = 2  # processes, where there are as many cores
+_SEVERAL, _MANY = 2, 8  # processes, where there are as many cores; pieces of work that are worth them
 
 
 @dataclass(frozen=True)
@@ -86,18 +87,18 @@ def design_command(given: Options) -> None:
     began, problem = time.perf_counter(), Problem.of(scene, wishes)
     with progress(f"{scene.name}: searching the catalogue", "so far", at_once=True) as shown, _mapped() as mapped:
         found = design(problem, parts, report=shown, mapped=mapped, own_light=given.own_light)
-    seconds, proof = time.perf_counter() - began, None
-    if given.renders and found.best is not None:
+    seconds, proofs = time.perf_counter() - began, ()
+    if given.renders:
         with progress(f"{scene.name}: rendering the station", "images", at_once=True) as shown:
-            proof = designed.prove(found, found.best, given.renders, shown)
+            found, proofs = designed.proven(found, given.renders, shown)
     if given.write is not None:
         designed.write(found, given.scene, given.write)
     if given.picture is not None:
         from validation.report import design_figure
 
         design_figure.draw(found, parts.currency, given.picture)
-    _show(found, parts, proof, seconds, given)
-    if not found.reached or (proof is not None and not proof.holds):
+    _show(found, parts, proofs, seconds, given)
+    if not found.reached or (proofs and not proofs[-1].holds):
         raise typer.Exit(1)
 
 
@@ -118,24 +119,30 @@ def _wishes(given: Options) -> Wishes:
 
 @contextmanager
 def _mapped() -> Iterator[Callable[..., Any]]:
-    """`map` over the cores of this machine."""
+    """`map` over two processes, which are begun when there is work for them."""
     from validation.batch import pool
 
-    if pool.cores() < _SEVERAL:
-        yield map
-        return
-    with pool.local(_SEVERAL) as crew:
-        yield crew.executor.map
+    with ExitStack() as stack:
+        crews: list[Any] = []
+
+        def mapped(function: Callable[..., Any], items: Sequence[Any]) -> Iterable[Any]:
+            if len(items) < _MANY or pool.cores() < _SEVERAL:
+                return map(function, items)
+            if not crews:
+                crews.append(stack.enter_context(pool.local(_SEVERAL)))
+            return crews[0].executor.map(function, items)
+
+        yield mapped
 
 
-def _show(found: Design, parts: catalogue.Catalogue, proof: Proof | None, seconds: float, given: Options) -> None:
+def _show(found: Design, parts: catalogue.Catalogue, proofs: tuple[Proof, ...], seconds: float, given: Options) -> None:
     if given.as_json:
-        say(facts(found, parts, proof, seconds), True, "")
+        say(facts(found, parts, proofs, seconds), True, "")
         return
     from validation.report import design_table
 
     shown_on = console()
-    shown_on.print(design_table.report(found, parts.currency, proof, seconds), highlight=False)
+    shown_on.print(design_table.report(found, parts.currency, proofs, seconds), highlight=False)
     if parts.is_sample:
         shown_on.print("The bundled catalogue is a sample, no offer.", highlight=False)
     for path in (given.picture, given.write):
@@ -143,14 +150,14 @@ def _show(found: Design, parts: catalogue.Catalogue, proof: Proof | None, second
             shown_on.print(f"written: {path}", highlight=False)
 
 
-def facts(found: Design, parts: catalogue.Catalogue, proof: Proof | None, seconds: float) -> dict:
+def facts(found: Design, parts: catalogue.Catalogue, proofs: tuple[Proof, ...], seconds: float) -> dict:
     """Everything for JSON."""
     searched, wishes = found.searched, found.problem.wishes
     return plain({
         "scene": found.problem.scene.name, "catalogue": parts.title, "is_sample": parts.is_sample,
         "cost": parts.currency or "price" if found.priced else "megapixels",
         "k": wishes.k if wishes.false_acceptance is None else None, "false_acceptance": wishes.false_acceptance,
-        "reached": found.reached, "best": found.best and _offer(found, found.best),
+        "reached": found.reached, "signed": _signed(found, proofs), "best": found.best and _offer(found, found.best),
         "front": [_offer(found, each) for each in found.front],
         "searched": {
             "sensors": searched.sensors, "lenses": searched.lenses, "lights": searched.lights,
@@ -158,12 +165,21 @@ def facts(found: Design, parts: catalogue.Catalogue, proof: Proof | None, second
             "pairs_left_out": searched.pairs_left_out, "views": searched.views, "rated": searched.rated,
             "close": searched.close, "complete": searched.complete,
         },
-        "proof": proof and {
-            "ratio": proof.ratio, "statuses": list(proof.budget.statuses), "holds": proof.holds,
-            "verdict": proof.run and proof.run.verdict.text,
-        },
+        "proofs": [
+            {"names": list(each.offer.rated.names), "ratio": each.ratio, "statuses": list(each.budget.statuses),
+             "holds": each.holds, "verdict": each.run and each.run.verdict.text}
+            for each in proofs
+        ],
         "seconds": seconds,
     })  # fmt: skip
+
+
+def _signed(found: Design, proofs: tuple[Proof, ...]) -> bool:
+    """Whether all values of the best may be signed: by its proof, or as predicted."""
+    if proofs:
+        return proofs[-1].holds
+    close = found.best and found.best.close
+    return bool(close) and all(map(is_trusted, close.statuses))
 
 
 def _offer(found: Design, offer: Offer) -> dict:

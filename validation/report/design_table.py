@@ -14,7 +14,7 @@ from validation.report.cells import pose, table
 _BEST = 3  # stations that are told of
 
 
-def report(found: Design, currency: str, proof: Proof | None, seconds: float) -> Group:
+def report(found: Design, currency: str, proofs: tuple[Proof, ...], seconds: float) -> Group:
     """The station, why, the front, what was left out."""
     scene, wishes = found.problem.scene, found.problem.wishes
     asked = (
@@ -23,8 +23,7 @@ def report(found: Design, currency: str, proof: Proof | None, seconds: float) ->
     )  # fmt: skip
     lines = [f"{scene.title or scene.name}: {asked} (T: half of the tolerance zone)"]
     lines += _best(found, currency)
-    if proof is not None:
-        lines += _proof(proof)
+    lines += [line for each in proofs for line in _proof(each)]
     parts = [Text("\n".join(lines)), _front(found, currency)]
     notes = [line for offer in _few(found) for line in _why(found, offer, currency)]
     notes += ["Left out:", *(f"  {line}" for line in design_words.left_out(found))]
@@ -72,7 +71,8 @@ def _ratio(found: Design, offer: Offer) -> str:
 
 def _proof(proof: Proof) -> list[str]:
     states = "all values may be signed" if proof.trusted else f"statuses {', '.join(proof.budget.statuses)}"
-    lines = [f"Rendered: worst U over what is allowed {proof.ratio:.3f}, biases taken off; {states}."]
+    names = " + ".join(proof.offer.rated.names)
+    lines = [f"{names}, rendered: worst U over what is allowed {proof.ratio:.3f}, biases taken off; {states}."]
     if proof.run is not None:
         lines.append(f"Noisy pictures: {proof.run.verdict.text}")
     return lines
