@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from scenes import Camera, InvalidInput
 
 _ROUNDING = 2.0**-24
@@ -19,10 +21,19 @@ def check_precision(camera: Camera) -> None:
     Raises
     ------
     InvalidInput
-        If the focal length is longer than 83 886 px.
+        If the focal length is longer than 83 886 px; of a telecentric camera, whose rays begin near the object, if the
+        object lies so many px from the origin.
     """
-    if camera.focal_px > LONGEST_PX:
+    longest = LONGEST_PX * camera.distance / _reach(camera)
+    if camera.focal_px > longest:
         raise InvalidInput(
-            f"camera.focal_px must be at most {LONGEST_PX:.0f} px to be rendered in single precision, "
+            f"camera.focal_px must be at most {longest:.0f} px to be rendered in single precision, "
             f"got {camera.focal_px:g}"
         )
+
+
+def _reach(camera: Camera) -> float:
+    """How far places of a ray are away, scene units: as far as a pinhole, or what is seen from the origin."""
+    if camera.perspective == 1:
+        return camera.distance
+    return float(np.linalg.norm(camera.look_at)) + max(camera.field_of_view)

@@ -22,6 +22,8 @@ from imaging.features.rim_sides import (
     steady,
     within_ends,
 )
+from imaging.geometry.lens import blur_at
+from imaging.geometry.projection import depth
 from imaging.pictures import Pictures
 from scenes import Circle
 
@@ -52,6 +54,8 @@ class RimImage:
         How much of a whole turn the points stand for, 1 but for arcs.
     off_ends : ndarray of bool, shape (..., n), optional
         Which points of an arc are `locator.reach` off its ends; others have no contrast.
+    blur : ndarray, shape (..., n), or float
+        Standard deviation of the lens' blur there, px.
     """
 
     design: np.ndarray
@@ -61,6 +65,7 @@ class RimImage:
     clear: np.ndarray
     turn: float = 1.0
     off_ends: np.ndarray | None = None
+    blur: np.ndarray | float = 0.0
 
     @property
     def left(self) -> np.ndarray:
@@ -100,13 +105,14 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> RimImag
     arc, far = speed * circle.turn / angle.size, reach(scene.locator.scale_px, scene.camera.blur_px)
     turn = circle.turn / (2 * np.pi)
     off_ends = None if circle.ends is None else within_ends(pictures, circle, angle)
+    blur = blur_at(scene.camera, depth(circle.at(angle), pictures.sensors, scene.camera))
     if seen is not None:
         squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
-        return RimImage(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends)
+        return RimImage(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends, blur)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
-    return RimImage(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends)
+    return RimImage(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends, blur)
 
 
 def _off(squared: np.ndarray, off_ends: np.ndarray | None) -> np.ndarray:
@@ -121,28 +127,29 @@ def fisher_circle(circle: RimImage, weights: np.ndarray, counted: np.ndarray | N
     return _covariance(information, enough if counted is None else enough & (counted.sum(-1) > 3))
 
 
-def calibrated_circle(circle: RimImage, kappa2: float, scale: float, weakest: float) -> np.ndarray:
+def calibrated_circle(circle: RimImage, kappa2: np.ndarray | float, scale: float, weakest: float) -> np.ndarray:
     """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
 
-    Points weigh as the squared contrast over the noise's variance. ``kappa2`` is a point's variance over that of the
-    noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to second order, as along an
-    edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less 2 scale^2 at each end of a piece
-    that is used; infinite where the pieces are so short that this would not be positive. Disturbed points and those of
-    a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of a turn must be left.
+    Points weigh as the squared contrast over the noise's variance. ``kappa2``, (..., n) or one number, is a point's
+    variance over that of the noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to
+    second order, as along an edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less
+    2 scale^2 at each end of a piece that is used; infinite where the pieces are so short that this would not be
+    positive. Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are left
+    out; a tenth of a turn must be left.
     """
     taken = circle.clear | circle.crowded[..., None]
     ratio = circle.squared / circle.noise_variance
     used = taken & (ratio >= weakest)
     ends = (used & ~np.roll(used, 1, -1)).astype(int) + (used & ~np.roll(used, -1, -1))
-    information, at_ends = (
+    information, along, at_ends = (
         np.einsum("...n,...ni,...nj->...ij", np.where(used, weight * ratio, 0.0), circle.design, circle.design)
-        for weight in (circle.arc, ends)
+        for weight in (circle.arc, kappa2 * circle.arc, kappa2 * ends)
     )
-    scatter = 2 * np.sqrt(np.pi) * scale * information - 2 * scale**2 * at_ends
+    scatter = 2 * np.sqrt(np.pi) * scale * along - 2 * scale**2 * at_ends
     inverse = _covariance(information, (circle.turn * used.mean(-1) >= LEAST_SEEN) & _positive(scatter))
     good = np.isfinite(inverse).all((-1, -2))[..., None, None]
     known = np.where(good, inverse, 0.0)
-    return np.where(good, kappa2 * known @ scatter @ known, inverse)
+    return np.where(good, known @ scatter @ known, inverse)
 
 
 def _positive(matrices: np.ndarray) -> np.ndarray:

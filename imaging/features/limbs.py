@@ -12,6 +12,8 @@ import numpy as np
 from imaging.features.circles import RimImage
 from imaging.features.limb_look import LimbLook, clear_of_others, limb_look
 from imaging.features.limb_outline import LIMB_POINTS, LimbOutline, limb_outline
+from imaging.geometry.lens import blur_at
+from imaging.geometry.projection import depth
 from imaging.pictures import Pictures
 from scenes import Curved
 
@@ -25,9 +27,12 @@ def _limb_rim(pictures: Pictures, curved: Curved) -> RimImage:
     outline = limb_outline(curved, pictures.sensors, pictures.scene.camera, LIMB_POINTS)
     seen = limb_look(pictures, curved, outline)
     clear = seen.good & clear_of_others(pictures, curved, outline, seen)
-    return rim_of(outline, seen, clear)
+    camera = pictures.scene.camera
+    away = depth(np.where(outline.seen[..., None], outline.points, curved.centre), pictures.sensors, camera)
+    return rim_of(outline, seen, clear, blur_at(camera, away))
 
 
-def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray) -> RimImage:
+def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray, blur: np.ndarray | float = 0.0) -> RimImage:
     """As a circle's rim; places that are not there have no contrast."""
-    return RimImage(np.nan_to_num(outline.design), np.nan_to_num(outline.arc), seen.squared, seen.noise_variance, clear)
+    design, arc = np.nan_to_num(outline.design), np.nan_to_num(outline.arc)
+    return RimImage(design, arc, seen.squared, seen.noise_variance, clear, blur=blur)

@@ -55,7 +55,7 @@ def _calibrated(pictures: Pictures) -> Errors:
         return np.where(weak, np.inf, variance)
 
     def found(circle) -> np.ndarray:
-        return calibrated_circle(circle, kappa2(scale, scene.camera.blur_px), scale, MIN_CONTRAST**2)
+        return calibrated_circle(circle, kappa2(scale, circle.blur), scale, MIN_CONTRAST**2)
 
     return combined(pictures, line_variance, squared.mean(-1), noise.mean(-1), found)
 

@@ -16,7 +16,6 @@ def edge_bound(pictures: Pictures) -> Errors:
 
     s_n^2 is the mean of both sides' noise, which differs from the truth by second order in their difference.
     """
-    scene = pictures.scene
     along = Along.of(pictures, trimmed=False)
     nodes = along.nodes
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -30,7 +29,7 @@ def edge_bound(pictures: Pictures) -> Errors:
         return a**2 / total + lever**2 / (second - first * mean)
 
     def found(circle) -> np.ndarray:
-        density = information_bound(np.sqrt(circle.squared), circle.noise_variance, scene.camera.blur_px)
+        density = information_bound(np.sqrt(circle.squared), circle.noise_variance, circle.blur)
         return fisher_circle(circle, density * circle.arc, None)
 
     noise = np.mean(along.noise_variance * np.ones(1), -1)

@@ -243,7 +243,7 @@ def _rim_errors(pictures: Pictures, image: RimImage) -> tuple[np.ndarray, np.nda
     """Which points of a rim are used, and their standard deviations along the radius, the scene's unit, (..., n)."""
     scene = pictures.scene
     used = (image.clear | image.crowded[..., None]) & (image.squared >= CLEAREST**2 * image.noise_variance)
-    variance = kappa2(scene.locator.scale_px, scene.camera.blur_px) * image.noise_variance / image.squared
+    variance = kappa2(scene.locator.scale_px, image.blur) * image.noise_variance / image.squared
     return used, np.sqrt(variance) / np.abs(image.design[..., 2])
 
 

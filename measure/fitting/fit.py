@@ -72,6 +72,10 @@ def fit(
         If the scene is one of another kind, photographs are not of the camera's size, or there is no pose to begin at.
     """
     check_drawable(scene)
+    if scene.camera.perspective != 1:
+        raise InvalidInput(
+            f"camera.kind must be pinhole for a fit, which tells the distance by the size, got {scene.camera.kind}"
+        )
     for name in free:
         if name not in OPTIONS:
             raise InvalidInput(f"free must be some of {', '.join(OPTIONS)}, got {name!r}")

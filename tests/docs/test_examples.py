@@ -46,9 +46,21 @@ def test_uncertainty_budget(example, capsys):
     assert f"halving {largest.source}" in capsys.readouterr().out
 
 
+def test_height_error(example):
+    """Through a pinhole 11.7 mm x 2 mm over the depth of the rims, as they are told (first order) and as they are."""
+    found = example("height_error").main(supersample=2)
+    for told, seen in (found["telecentric"], found["telecentricity 0.1 degrees"]):
+        assert seen == pytest.approx(told, abs=2e-4)
+    assert found["telecentric"][0] < 1e-6
+    assert found["telecentricity 0.1 degrees"][0] == pytest.approx(2.48e-3, rel=0.01)
+    told, seen = found["pinhole"]
+    assert told == pytest.approx(11.7047 * 2 / 108.5, rel=1e-3)
+    assert seen == pytest.approx(11.7047 * 2 / 106.5, rel=0.01)
+
+
 def test_every_example_is_tested():
     names = {path.stem for path in (ROOT / "examples").glob("*.py")}
-    assert names == {"predict_and_plan", "render_and_compare", "uncertainty_budget"}
+    assert names == {"height_error", "predict_and_plan", "render_and_compare", "uncertainty_budget"}
 
 
 def test_the_readmes_library_example(capsys):

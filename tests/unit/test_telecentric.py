@@ -27,6 +27,7 @@ from imaging.geometry.projection import (
 )  # fmt: skip
 from imaging.geometry.visibility import hidden_spans, seen
 from imaging.pictures import Pictures
+from planner.budgeting.budgets import budget
 from scenes import Camera, InvalidInput, Picture, Telecentric
 from scenes.numbers import with_number
 from scenes.parts.surfaces import Cone, Cylinder, Sphere, Torus
@@ -304,9 +305,80 @@ def test_a_distance_between_faces_is_found_in_a_render_where_it_is(angle):
     block = scenes.load("task1")
     lens = {**WIDE, "look_at": block.camera.look_at, "exposure": 200.0, "telecentricity_deg": angle}
     picture = Picture.of(block.with_(camera=lens), (40, 30), (15, 270))
-    shown = render.image(picture, quality=render.Quality(supersample=8))
+    shown = render.image(picture, quality=render.Quality(supersample=6, everywhere=False))
     told = planner.predict(picture)
     found = measure.distance(shown, picture)
     assert (told.status, found.status) == ("ok", "ok")
     assert found.value_px == pytest.approx(told.value_px + told.bias_px, abs=1e-3)
     assert Pictures.of(picture).viewpoint.share == pytest.approx(angle and 0.149, abs=1e-3)
+
+
+HIGHER, ANGLE = 2.0, 0.15  # mm, degrees
+
+
+@pytest.fixture(scope="module")
+def plate():
+    """Of one bore, in a small picture along its axis, without what the telecentricity's own limit adds."""
+    whole = scenes.load("telecentric_plate")
+    asked = [{"name": "bore", "kind": "diameter", "features": [{"circle": "c2"}], "tolerance": 0.02}]
+    near = {"width": 150, "height": 140, "look_at": (6.0, 9.0, 1.5)}
+    return whole.with_(camera=near, measurands=asked, uncertain=(), uncertainty={"part_shift": HIGHER}, settings=())
+
+
+RADIUS = np.hypot(150, 140) / 2 * 9.9e-3 / 0.18  # mm, of the field
+
+
+def measured(scene, believed=None):
+    """The diameter in a render, mm."""
+    picture = Picture.of(scene, (0, 90))
+    shown = render.image(picture, quality=render.Quality(everywhere=False))
+    return measure.measure(shown, believed or picture).value[0]
+
+
+def nearer(scene, height):
+    """The part that much nearer to camera, its lamp as far below it as before."""
+    look_at = (*scene.camera.look_at[:2], scene.camera.look_at[2] - height)
+    return scene.with_(camera={"look_at": look_at})
+
+
+@pytest.mark.parametrize("angle", [0.0, ANGLE])
+def test_the_budgets_height_term_is_what_a_higher_part_does(plate, angle):
+    """2 mm: nothing where the chief rays are parallel, and where they are not what is measured in the picture, to 1 %.
+
+    By hand: the diameter times the chief ray's tangent over the field's radius, times the height.
+    """
+    scene = plate.with_(camera={"telecentricity_deg": angle})
+    found = budget(scene, (0, 90))["bore"]
+    term = next((row for row in found.contributions if row.source == "part_shift.z"), None)
+    told = 0.0 if term is None else term.contribution
+    wider = 1 - np.tan(np.radians(angle)) / RADIUS * 1.5  # of the scale at the rim, 1.5 mm over the middle
+    assert told == pytest.approx(6 * np.tan(np.radians(angle)) / RADIUS / wider * HIGHER, rel=1e-6, abs=1e-9)
+    change = measured(nearer(scene, HIGHER), Picture.of(scene, (0, 90))) - measured(scene)
+    assert change == pytest.approx(told, rel=0.01, abs=2e-5)
+
+
+def test_a_limit_of_unknown_sign_and_a_height_act_together(plate):
+    """Each alone moves nothing of a rim in the working plane; both, by the product of their uncertainties."""
+    level = plate.with_(camera={"look_at": (6.0, 9.0, 3.0), "telecentricity_deg": {"value": 0.0, "half_width": 0.1}})
+    found = {row.source: row.contribution for row in budget(level, (0, 90))["bore"].contributions}
+    per_degree = np.radians(0.1 / 3**0.5)
+    assert found["telecentricity x depth"] == pytest.approx(6 * per_degree / RADIUS * HIGHER, rel=1e-3)
+    assert found.get("camera.telecentricity_deg", 0.0) < 1e-9
+    assert found.get("part_shift.z", 0.0) < 1e-9
+
+
+def test_what_is_out_of_focus_is_as_blurred_in_a_render_as_is_told():
+    """A knife edge 3 mm before the working plane: the variance of its edge spread is blur^2 + c^2 / 4 + a pixel's."""
+    lens = {**SHEET, "width": 64, "height": 24, "numerical_aperture": 0.02, "blur_px": 0.5, "look_at": (3.0, 1.5, -3.0)}
+    told = scenes.load("telecentric_plate").with_(
+        object={"kind": "block", "size": [3.0, 3.0, 0.01]}, camera=lens, measurands=(), uncertain=(), settings=()
+    )
+    effects = ("attached_shadow", "cast_shadow", "backlight", "lens_blur", "depth_of_field")
+    shown = render.image(told, (0, 90), (), quality=render.Quality(supersample=8), effects=effects)[8:16].mean(0)
+    slope = np.abs(np.diff(shown))
+    place = np.arange(slope.size) + 0.5
+    middle = slope @ place / slope.sum()
+    spread = slope @ (place - middle) ** 2 / slope.sum()
+    confusion = float(signed_confusion(told.camera, np.array(107.0)))
+    assert confusion == pytest.approx(20 * 3 * 0.02 / (1 - 0.02**2) ** 0.5, rel=1e-12)
+    assert spread == pytest.approx(0.5**2 + confusion**2 / 4 + 1 / 12 + 1 / 12, rel=0.02)  # and of the difference

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.contours import limb
-from scenes import Camera
+from scenes import Camera, Telecentric
 from scenes.parts.surfaces import Cone, Cylinder, Quadric, Sphere, Surface, Torus
 from validation.hard.case import Answer, Case, Reference
 from validation.hard.precise import mp, mpf
@@ -29,6 +29,12 @@ def cases() -> list[Case]:
         found.append(_half_width(f"sphere as an equation, {name}", ball, distance))
         pipe = Quadric(np.diag([0.0, 1, 1]), (0, 0, 0), -4.0)
         found.append(_half_width(f"cylinder as an equation, {name}", pipe, distance))
+    for angle in (0.0, 1e-9, -1e-9, 0.1, -5.0):
+        for kind, surface in (
+            ("sphere", Sphere((0, 0, 0), 2.0)), ("cylinder", Cylinder((0, 0, 0), _AXIS, 2.0, (-1, 1))),
+            ("sphere as an equation", Quadric(np.eye(3), (0, 0, 0), -4.0)),
+        ):  # fmt: skip
+            found.append(_telecentric(f"{kind}, chief rays of {angle:g} deg", surface, angle))
     for angle in (1e-12, 1e-6):
         found.append(
             _half_width(
@@ -71,6 +77,26 @@ def _half_width(name: str, surface: Surface, distance: float, radius: float = 2.
 
     refusals = ("tangent",) if isinstance(surface, Quadric) and distance < 2.1 else ()
     return Case("limb", name, "half width px", ours, reference, refusals)
+
+
+def _telecentric(name: str, surface: Surface, angle: float) -> Case:
+    """The same before a telecentric camera, px: k r / sqrt(1 - t^2 r^2), k px a unit, t the tangent over the field."""
+    camera = Telecentric(
+        kind="telecentric", width=640, height=480, focal_px=_FOCAL, distance=30.0, magnification=1.0,
+        telecentricity_deg=angle,
+    )  # fmt: skip
+
+    def ours() -> Answer:
+        found = limb(surface, (0.0, 0.0), camera, np.linspace(0.0, 1.0, 9))
+        across = [np.linalg.norm(s.at[:, : 2 if _is_ball(surface) else 1], axis=1) for s in found.strands]
+        return Answer(float(np.concatenate(across).max()) if across else None, found.status)
+
+    def reference() -> Reference:
+        scale = mpf(_FOCAL) / 30
+        lean = mp.tan(mpf(angle) * mp.pi / 180) / (400 / scale)
+        return Reference.precise(scale * 2 / mp.sqrt(1 - (2 * lean) ** 2), 4.0)
+
+    return Case("limb", name, "half width px", ours, reference)
 
 
 def _is_ball(surface: Surface) -> bool:

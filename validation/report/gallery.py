@@ -43,6 +43,8 @@ TEACHES = {
     "shaft_ring": "The same shaft in reflected light: a limb is dark, and its shading biases it.",
     "task1": "The paper's own block, 16 settings: its Table 3 beside predictions that need no fitted constant.",
     "task1_part1": "The paper's search, sensor and light by turns, on a block of a tenth the size.",
+    "telecentric_plate": "A telecentric lens: how near the part stands matters by the lens' own telecentricity alone.",
+    "telecentric_shaft": "The same before a turned part: lines of sight run alike along all its limbs.",
     "two_lights": "Two lights in one total: `ice plan two_lights` shares it out between them.",
     "wedge": "An angle that is not 90 degrees: how well a corner of 30 degrees is found.",
 }

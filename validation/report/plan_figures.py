@@ -8,7 +8,7 @@ import numpy as np
 
 from imaging.features.projected_edges import circles, projected_edges
 from imaging.geometry.lens import recorded
-from imaging.geometry.projection import depth, facing, project
+from imaging.geometry.projection import facing, project
 from imaging.geometry.visibility import visible_spans
 from imaging.light.appearance import face_signal, is_separable
 from imaging.light.backlight import backlights
@@ -90,7 +90,7 @@ def draw_seen(axis, scene, sensor, light, points) -> None:
     levels = face_signal(pictures, middles, solid.triangle_faces, 1)
     brightest = max(levels.max(), np.finfo(float).tiny)
     corners = project(solid.triangles.reshape(-1, 3), pose, camera).reshape(-1, 3, 2)
-    for k in np.argsort(-depth(middles, pose, camera)):
+    for k in np.argsort(-np.linalg.norm(middles - pictures.sensor_at, axis=1)):
         face = solid.triangle_faces[k]
         if shown[face]:
             grey = str(0.08 + 0.85 * levels[k] / brightest)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.collections import PolyCollection
 
-from imaging.geometry.projection import depth, facing, project
+from imaging.geometry.projection import facing, project
 from imaging.geometry.visibility import visible_spans
 from planner import Pictures
 from scenes import Circle, Edge, Pose, Scene
@@ -103,6 +103,7 @@ class _View:
     def __init__(self, scene: Scene, sensor: Pose) -> None:
         pictures = Pictures.of(scene, list(sensor))
         self.scene, self.pose, self.viewpoint = scene, pictures.sensors, pictures.viewpoint
+        self.sensor_at = pictures.sensor_at
         self._spans: dict[str, list[tuple[float, float]]] = {}
         self.names: list[_Name] = []
 
@@ -122,7 +123,7 @@ def _faces(axis, view: _View) -> None:
     solid = view.scene.solid
     shown, middles = facing(solid, view.viewpoint), solid.triangles.mean(1)
     corners = view.image(solid.triangles.reshape(-1, 3)).reshape(-1, 3, 2)
-    away, far = view.viewpoint.towards(middles), depth(middles, view.pose, view.scene.camera)
+    away, far = view.viewpoint.towards(middles), np.linalg.norm(middles - view.sensor_at, axis=1)
     cosines = np.abs(np.einsum("ti,ti->t", solid.normals[solid.triangle_faces], away)) / np.linalg.norm(away, axis=1)
     order = np.argsort(-far, kind="stable")
     order = order[shown[solid.triangle_faces[order]]]
