@@ -25,6 +25,7 @@ from scenes.catalogue import ListedLens, ListedLight, ListedSensor
 from scenes.units import in_unit
 
 STEP_DEG = 20.0  # between places of a free light
+_APART_DEG = 10.0  # between it and the camera, one of which may stand behind the other
 OWN_LIGHT = ListedLight(name="the scene's own light")
 _IDEAL = ListedLight(name="a point bright enough", kind="spot", outer_diameter_mm=1.0, radiance=1e15)
 
@@ -209,7 +210,7 @@ def _best_light(problem: Problem, settings: Settings, view: Viewed) -> Rated | N
     if scene.free and lights.shape[1] != 2 * len(scene.free):
         return None
     errors = variance_model("calibrated")(Pictures.of(scene, sensor[None], by_light(lights) if scene.free else ()))
-    limits = Constraints(light_out_of_view=True)
+    limits = Constraints(light_out_of_view=True, min_separation_deg=_APART_DEG)
     possible = limits.pairs(scene, sensor, lights) & ~cut_off(errors, scene)
     noise = np.broadcast_to(errors.variances_object, (len(lights), len(problem.allowed)))
     ratios = np.where(possible, limit_ratio(problem, noise + view.systematic).max(-1), np.inf)
