@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,7 +46,7 @@ class Problem:
     lights : ndarray, shape (L, 2) or (L, 2 F)
         Where a free light, or several, may stand, degrees.
     otherwise_um : float
-        Blur of a lens without an MTF.
+        Blur of a lens without an MTF; NaN where it is not known.
     default_mm : float
         Distance of a light that is made for none.
     """
@@ -65,7 +66,7 @@ class Problem:
         Raises
         ------
         InvalidInput
-            As of `allowed`; if the scene's blur is needed and its pixel pitch is not known.
+            As of `allowed`.
         """
         limits = Constraints().on_side_of(scene)
         space = ViewingSpace(step_deg, limits.light_polar_deg).poses
@@ -82,7 +83,7 @@ def _own_blur(scene: Scene, wishes: Wishes) -> float:
     if wishes.lens_blur_um is not None:
         return wishes.lens_blur_um
     pitch = scene.camera.pixel_pitch_um
-    return 0.0 if pitch is None else scene.camera.blur_px * pitch
+    return math.nan if pitch is None else scene.camera.blur_px * pitch
 
 
 @dataclass(frozen=True, eq=False)

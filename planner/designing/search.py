@@ -24,11 +24,12 @@ from planner.designing.dominance import of_lens, of_light, of_sensor, undominate
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, Viewed, floor, rate_light, views
 from planner.designing.stations import station
 from scenes import InvalidInput, Scene
+from scenes.cameras.pinhole import MOST_PIXELS
 from scenes.catalogue import Catalogue, Entry, ListedLens, ListedSensor
 
 Report = Callable[[str, int, int], None]
-CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, BUDGET, DOMINATED = (
-    "contradictory", "incomplete", "no price", "colour filters", "budget", "dominated",
+CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, LARGE, BUDGET, DOMINATED = (
+    "contradictory", "incomplete", "no price", "colour filters", "too many pixels", "budget", "dominated",
 )  # fmt: skip
 PLACES = "places in the image"
 MOST_RATED = 20_000  # pairs that are rated at most, before the search gives up
@@ -36,6 +37,7 @@ _BESIDE = 24  # pairs that are rated for the front beyond the cheapest that does
 _TOGETHER = 16  # pairs whose views are found at a time
 _BETTER = 0.98  # of the ratio before: what is worth more cost
 _SHOWN = 12  # of the front
+_MOST_ASIDE = 16384  # columns or rows, of a scene's camera
 _LOOKS = 24  # close looks for it at most
 _SURE = 0.5  # of a noise that another camera's picture tells
 _OF_RATING = ("visibility", "light in the way", "exposure time", "depth of field", "light")
@@ -188,10 +190,10 @@ def design(
     return _Search(scene_problem, catalogue, report, mapped, beside, most).run()
 
 
-def usable(catalogue: Catalogue) -> tuple[dict[str, list[Entry]], dict[str, Counter]]:
+def usable(catalogue: Catalogue) -> tuple[dict[str, list[Any]], dict[str, Counter]]:
     """Entries of each table that a station can be made of, and how many are left out by what."""
     wrong = {each.entry for each in catalogue.contradictions()}
-    kept: dict[str, list[Entry]] = {}
+    kept: dict[str, list[Any]] = {}
     out: dict[str, Counter] = {}
     for table in ("sensors", "lenses", "lights"):
         kept[table], out[table] = [], Counter()
@@ -211,6 +213,10 @@ def _unusable(each: Entry, wrong: set[str], priced: bool) -> str:
         return INCOMPLETE
     if priced and each.price is None and each != OWN_LIGHT:
         return PRICELESS
+    if isinstance(each, ListedSensor) and (
+        np.prod(each.resolution) > MOST_PIXELS or max(each.resolution) > _MOST_ASIDE
+    ):
+        return LARGE
     return COLOUR if isinstance(each, ListedSensor) and each.colour else ""
 
 
@@ -238,6 +244,11 @@ class _Search:
             if not left:
                 told = ", ".join(f"{count} {why}" for why, count in out[table].items() if count) or "none given"
                 raise InvalidInput(f"catalogue must have {table} that a station can be made of, got {told}")
+        if math.isnan(self.problem.otherwise_um) and not all(lens.mtf for lens in kept["lenses"]):
+            raise InvalidInput(
+                "lens_blur_um (--lens-blur) must be given for lenses without an MTF where the scene's camera has no"
+                " pixel_pitch_um, got nothing"
+            )
         self.sensors: list[Any] = kept["sensors"]
         self.lenses, self.lights = kept["lenses"], kept["lights"]
         self.lights = sorted(self.lights, key=lambda each: each.price or 0.0)

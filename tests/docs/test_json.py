@@ -46,7 +46,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "budget": ("calibrated_rig", "--monte-carlo", "--reach", "0.005"),
     "msa": ("calibrated_rig",),
     "catalogue": ("check", "parts.toml"),
-    "design": ("calibrated_rig", "--catalogue", "parts.toml", "--own-light"),
+    "design": ("calibrated_rig", "--catalogue", "parts.toml", "--own-light", "--lens-blur", "2"),
     "cost": ("small.toml", "--budget", "1s", "--out", "cost"),
     "explore": ("small.toml",),
     "hard": ("--area", "reflectance"),

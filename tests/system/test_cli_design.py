@@ -40,6 +40,7 @@ def test_the_sample_is_right_and_a_wrong_catalogue_is_not(folder):
         ((*ASKED, "--false-acceptance", "0.1"), "uncertainty.process_sd must be given"),
         ((*ASKED, "--picture", "x.gif"), "--picture must end in .png, .svg, got 'x.gif'"),
         ((*ASKED, "--farthest", "-1"), "--farthest must be at least 0, got -1"),
+        (ASKED[:5], "lens_blur_um (--lens-blur) must be given for lenses without an MTF"),
         (
             ("design", "task1", "--catalogue", "parts.toml"),
             "tolerance must be given for a measurand at least, got none",

@@ -14,7 +14,7 @@ from planner.designing.bounds import NOISE, REASONS, pairs
 from planner.designing.dominance import of_light, of_sensor, undominated
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, limit_ratio, rate, rate_light, views
 from planner.designing.optics import TIME, Placed, blur_um, chosen, placed
-from planner.designing.search import CONTRADICTORY, INCOMPLETE, PRICELESS, design, usable
+from planner.designing.search import COLOUR, CONTRADICTORY, INCOMPLETE, LARGE, PRICELESS, design, usable
 from planner.designing.stations import carried, station
 from planner.designing.wishes import Wishes, allowed
 from planner.uncertainty.risks import Limits, global_risks
@@ -167,9 +167,11 @@ def test_entries_that_cannot_be_used_are_counted() -> None:
     found = synthetic(1, 3, 2, 2)
     odd = [each.model_copy(update=change) for each, change in zip(
         found.sensors, ({"quantum_efficiency": 40.0}, {"mount": ()}, {"price": None}), strict=True)]  # fmt: skip
-    kept, out = usable(found.model_copy(update={"sensors": (*odd, found.sensors[0])}))
-    assert len(kept["sensors"]) == 1 or out["sensors"][CONTRADICTORY]
-    assert (out["sensors"][INCOMPLETE], out["sensors"][PRICELESS]) == (1, 1)
+    names = ({"name": "large", "resolution": (9000, 7000)}, {"name": "coloured", "colour": True}, {"name": "good"})
+    more = [found.sensors[0].model_copy(update=change) for change in names]
+    kept, out = usable(found.model_copy(update={"sensors": (*odd, *more)}))
+    assert [each.name for each in kept["sensors"]] == ["good"]
+    assert out["sensors"] == {CONTRADICTORY: 1, INCOMPLETE: 1, PRICELESS: 1, LARGE: 1, COLOUR: 1}
     with pytest.raises(
         InvalidInput, match="catalogue must have sensors that a station can be made of, got 1 incomplete"
     ):
