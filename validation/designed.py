@@ -27,7 +27,7 @@ _DERIVED = ("distance", "focal_px")  # of a camera's data sheet
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
+class StationProof:
     """A station's budget with biases as renders tell them, and its noise in noisy pictures.
 
     Attributes
@@ -66,7 +66,7 @@ def posed(design: Design, offer: Offer) -> Scene:
     return scene.with_(settings=(setting,))
 
 
-def prove(design: Design, offer: Offer, renders: int, report: Any = None) -> Proof:
+def prove(design: Design, offer: Offer, renders: int, report: Any = None) -> StationProof:
     """Render a station, take its biases off, and measure so many noisy pictures."""
     from validation.batch.job import run
 
@@ -78,10 +78,10 @@ def prove(design: Design, offer: Offer, renders: int, report: Any = None) -> Pro
     if renders > 1:
         with TemporaryDirectory() as directory:
             made = run(scene, renders, out=Path(directory) / "run", workers=1, fresh=True, progress=report)
-    return Proof(offer, found, float(ratio), made)
+    return StationProof(offer, found, float(ratio), made)
 
 
-def proven(design: Design, renders: int, report: Any = None) -> tuple[Design, tuple[Proof, ...]]:
+def proven(design: Design, renders: int, report: Any = None) -> tuple[Design, tuple[StationProof, ...]]:
     """The design with the first station that rendering bears out: the best, or the next of the front that meet all.
 
     Without any the design stays as it is, and its proofs say so.
@@ -90,7 +90,7 @@ def proven(design: Design, renders: int, report: Any = None) -> tuple[Design, tu
         return design, ()
     dearer = [each for each in design.front if each.cost >= design.best.cost and each.ratio <= 1]
     tried = [design.best, *(each for each in dearer if each.rated is not design.best.rated)][:_TRIED]
-    proofs: list[Proof] = []
+    proofs: list[StationProof] = []
     for offer in tried:
         proofs.append(prove(design, offer, renders, report))
         if proofs[-1].holds:

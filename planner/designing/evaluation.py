@@ -15,7 +15,7 @@ from planner.budgeting.sources import sources
 from planner.budgeting.terms import terms
 from planner.constraints import Constraints
 from planner.designing.aspects import Aspect, aspects
-from planner.designing.optics import Placed, Settings, chosen, placed
+from planner.designing.optics import Focused, Settings, chosen, focused
 from planner.designing.stations import station
 from planner.designing.wishes import Wishes, allowed
 from planner.prediction import glanced, predict
@@ -93,13 +93,13 @@ class Viewed:
     Attributes
     ----------
     aspect : Aspect
-    placed : Placed
+    focused : Focused
     systematic : ndarray, shape (M,)
         Variances, the scene's unit squared or degrees^2; infinite where a quantity is not seen.
     """
 
     aspect: Aspect
-    placed: Placed
+    focused: Focused
     systematic: np.ndarray
 
 
@@ -137,7 +137,7 @@ def views(problem: Problem, sensor: ListedSensor, lens: ListedLens) -> tuple[Vie
     """From where a pair sees all that is measured, the least unsure place first; or what keeps it from that."""
     found, why = [], []
     for aspect in _nearest_turns(problem, sensor, lens):
-        at = placed(sensor, lens, aspect, problem.wishes)
+        at = focused(sensor, lens, aspect, problem.wishes)
         if isinstance(at, str):
             why.append(at)
             continue
@@ -187,7 +187,7 @@ def rate_light(
     for view in seen:
         if best is not None and floor(problem, view) >= best.ratio:
             break  # they come by what their places leave unsure
-        settings = _set(problem, sensor, lens, light, view.aspect, view.placed)
+        settings = _set(problem, sensor, lens, light, view.aspect, view.focused)
         if isinstance(settings, str):
             why = settings
             continue
@@ -198,7 +198,7 @@ def rate_light(
 
 
 def _set(
-    problem: Problem, sensor: ListedSensor, lens: ListedLens, light: ListedLight, aspect: Aspect, at: Placed
+    problem: Problem, sensor: ListedSensor, lens: ListedLens, light: ListedLight, aspect: Aspect, at: Focused
 ) -> Settings | str:
     scale = problem.scene.locator.scale_px
     return chosen(sensor, lens, light, aspect, problem.wishes, scale, problem.otherwise_um, problem.default_mm, at)

@@ -63,7 +63,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Placed:
+class Focused:
     """A lens before a sensor, in focus on a part: what does not depend on the light.
 
     Attributes
@@ -75,7 +75,7 @@ class Placed:
     magnification: float
 
 
-def placed(sensor: ListedSensor, lens: ListedLens, aspect: Aspect, wishes: Wishes) -> Placed | str:
+def focused(sensor: ListedSensor, lens: ListedLens, aspect: Aspect, wishes: Wishes) -> Focused | str:
     """Where the camera stands, as near as it can; or what keeps it from it."""
     if not sensor.takes(lens.mount):
         return MOUNT
@@ -94,7 +94,7 @@ def placed(sensor: ListedSensor, lens: ListedLens, aspect: Aspect, wishes: Wishe
     most = min(wishes.farthest_mm, math.inf if lens.is_telecentric else lens.maximum_object_distance_mm or math.inf)
     if not max(wishes.nearest_mm, aspect.nearest_mm) <= far <= most:
         return DISTANCE
-    return Placed(far, scale)
+    return Focused(far, scale)
 
 
 def working(lens: ListedLens, stop: float, magnification: float) -> float:
@@ -103,7 +103,7 @@ def working(lens: ListedLens, stop: float, magnification: float) -> float:
 
 
 def blur_um(
-    lens: ListedLens, stop: float, at: Placed, aspect: Aspect, wavelength_nm: float, otherwise_um: float
+    lens: ListedLens, stop: float, at: Focused, aspect: Aspect, wavelength_nm: float, otherwise_um: float
 ) -> float:
     """Standard deviation of the blur on the sensor: diffraction, the lens' own, and defocus at the ends of the depth.
 
@@ -116,7 +116,7 @@ def blur_um(
     return math.hypot(airy_um(wavelength_nm, number), otherwise_um if own is None else own, defocus)
 
 
-def longest_s(sensor: ListedSensor, at: Placed, wishes: Wishes) -> float:
+def longest_s(sensor: ListedSensor, at: Focused, wishes: Wishes) -> float:
     """Longest exposure that the camera, the rate of parts and their motion leave."""
     times = [LONGEST_S, *([sensor.exposure_max_us * 1e-6] if sensor.exposure_max_us else [])]
     if wishes.rate_hz:
@@ -141,7 +141,7 @@ def electrons_per_s(sensor: ListedSensor, lens: ListedLens, number: float, light
 
 
 def light_distance(
-    light: ListedLight, at: Placed, aspect: Aspect, telecentric: bool, default_mm: float
+    light: ListedLight, at: Focused, aspect: Aspect, telecentric: bool, default_mm: float
 ) -> float | None:
     """From the reference point; None where it would stand in the way of the camera.
 
@@ -169,10 +169,10 @@ def light_distance(
 
 def chosen(
     sensor: ListedSensor, lens: ListedLens, light: ListedLight, aspect: Aspect, wishes: Wishes, scale_px: float,
-    otherwise_um: float, default_mm: float, at: Placed | None = None,
+    otherwise_um: float, default_mm: float, at: Focused | None = None,
 ) -> Settings | str:  # fmt: skip
     """The aperture and exposure of the least variance of an edge point, kappa^2 s_n^2 / C^2; or what keeps from any."""
-    at = at or placed(sensor, lens, aspect, wishes)
+    at = at or focused(sensor, lens, aspect, wishes)
     if isinstance(at, str):
         return at
     far = light_distance(light, at, aspect, lens.is_telecentric, default_mm)
@@ -206,7 +206,7 @@ def noise_to_signal(sensor: ListedSensor, fill: float) -> float:
     return (sensor.temporal_dark_noise_e**2 + signal / 2) / signal**2
 
 
-def least_blur_px(lens: ListedLens, sensor: ListedSensor, at: Placed, aspect: Aspect, otherwise_um: float) -> float:
+def least_blur_px(lens: ListedLens, sensor: ListedSensor, at: Focused, aspect: Aspect, otherwise_um: float) -> float:
     """Least of all apertures, in the shortest light of the catalogue's kind, standing still."""
     return min(
         blur_um(lens, stop, at, aspect, min(WHITE_NM, 400.0), otherwise_um) / sensor.pixel_pitch_um

@@ -86,7 +86,7 @@ class Offer:
 
 
 @dataclass(frozen=True)
-class Searched:
+class Tally:
     """What was looked at, and what was left out by what.
 
     Attributes
@@ -135,7 +135,7 @@ class Design:
         Whether it meets all.
     front : tuple of Offer
         By rising cost, each with less U than all before.
-    searched : Searched
+    searched : Tally
     priced : bool
         Whether costs are prices.
     """
@@ -144,7 +144,7 @@ class Design:
     best: Offer | None
     reached: bool
     front: tuple[Offer, ...]
-    searched: Searched
+    searched: Tally
     priced: bool
 
     @property
@@ -416,7 +416,7 @@ class _Search:
         best = winner or min((each for each in front), key=lambda each: each.ratio, default=None)
         catalogue = self.catalogue
         self.out |= {name: self.counts[name] for name in _OF_RATING if self.counts[name]}
-        searched = Searched(
+        searched = Tally(
             len(catalogue.sensors), len(catalogue.lenses), len(catalogue.lights),
             {table: {why: n for why, n in some.items() if n} for table, some in out.items()},
             len(self.sensors) * len(self.lenses), {why: n for why, n in self.out.items() if n},

@@ -13,7 +13,7 @@ from imaging.geometry.projection import project
 from planner.designing.bounds import NOISE, REASONS, pairs
 from planner.designing.dominance import of_light, of_sensor, undominated
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, limit_ratio, rate, rate_light, views
-from planner.designing.optics import TIME, Placed, blur_um, chosen, placed
+from planner.designing.optics import TIME, Focused, blur_um, chosen, focused
 from planner.designing.search import COLOUR, CONTRADICTORY, INCOMPLETE, LARGE, PRICELESS, design, usable
 from planner.designing.stations import carried, station
 from planner.designing.wishes import Wishes, allowed
@@ -68,7 +68,7 @@ def test_the_distance_is_the_least_that_shows_all() -> None:
     for camera in found.sensors:
         for lens in found.lenses:
             aspect = problem.aspects[0]
-            at = placed(camera, lens, aspect, problem.wishes)
+            at = focused(camera, lens, aspect, problem.wishes)
             if isinstance(at, str) or lens.is_telecentric:
                 continue
             settings = chosen(camera, lens, OWN_LIGHT, aspect, problem.wishes, 1.0, 2.0, 300.0, at)
@@ -93,7 +93,7 @@ def test_blur_is_diffraction_and_defocus() -> None:
     aspect = _problem(name="bracket_mm").aspects[0]
     airy = math.sqrt(2) / (2 * math.pi) * 0.55 / (1 / 16)  # sqrt(2) lambda / (2 pi NA)
     disc = 0.5**2 * aspect.half_depth_mm / 8 * 1000  # um, m^2 z / N
-    found = blur_um(lens, 8.0, Placed(100.0, 0.5), aspect, 550.0, 0.0)
+    found = blur_um(lens, 8.0, Focused(100.0, 0.5), aspect, 550.0, 0.0)
     assert found == pytest.approx(math.hypot(airy, disc / 4), rel=1e-12)
 
 

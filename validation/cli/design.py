@@ -23,7 +23,7 @@ from validation.strict_json import plain
 if TYPE_CHECKING:
     from planner.designing.search import Design, Offer
     from planner.designing.wishes import Wishes
-    from validation.designed import Proof
+    from validation.designed import StationProof
 
 commands = commands()
 _MOST = 1e9
@@ -135,7 +135,9 @@ def _mapped() -> Iterator[Callable[..., Any]]:
         yield mapped
 
 
-def _show(found: Design, parts: catalogue.Catalogue, proofs: tuple[Proof, ...], seconds: float, given: Options) -> None:
+def _show(
+    found: Design, parts: catalogue.Catalogue, proofs: tuple[StationProof, ...], seconds: float, given: Options
+) -> None:
     if given.as_json:
         say(facts(found, parts, proofs, seconds), True, "")
         return
@@ -150,7 +152,7 @@ def _show(found: Design, parts: catalogue.Catalogue, proofs: tuple[Proof, ...], 
             shown_on.print(f"written: {path}", highlight=False)
 
 
-def facts(found: Design, parts: catalogue.Catalogue, proofs: tuple[Proof, ...], seconds: float) -> dict:
+def facts(found: Design, parts: catalogue.Catalogue, proofs: tuple[StationProof, ...], seconds: float) -> dict:
     """Everything for JSON."""
     searched, wishes = found.searched, found.problem.wishes
     return plain({
@@ -174,7 +176,7 @@ def facts(found: Design, parts: catalogue.Catalogue, proofs: tuple[Proof, ...], 
     })  # fmt: skip
 
 
-def _signed(found: Design, proofs: tuple[Proof, ...]) -> bool:
+def _signed(found: Design, proofs: tuple[StationProof, ...]) -> bool:
     """Whether all values of the best may be signed: by its proof, or as predicted."""
     if proofs:
         return proofs[-1].holds

@@ -7,14 +7,14 @@ from rich.text import Text
 
 from planner.designing.search import Design, Offer
 from scenes.status import is_trusted
-from validation.designed import Proof
+from validation.designed import StationProof
 from validation.report import design_words
 from validation.report.cells import pose, table
 
 _BEST = 3  # stations that are told of
 
 
-def report(found: Design, currency: str, proofs: tuple[Proof, ...], seconds: float) -> Group:
+def report(found: Design, currency: str, proofs: tuple[StationProof, ...], seconds: float) -> Group:
     """The station, why, the front, what was left out."""
     scene, wishes = found.problem.scene, found.problem.wishes
     asked = (
@@ -69,7 +69,7 @@ def _ratio(found: Design, offer: Offer) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
-def _proof(proof: Proof) -> list[str]:
+def _proof(proof: StationProof) -> list[str]:
     states = "all values may be signed" if proof.trusted else f"statuses {', '.join(proof.budget.statuses)}"
     names = " + ".join(proof.offer.rated.names)
     lines = [f"{names}, rendered: worst U over what is allowed {proof.ratio:.3f}, biases taken off; {states}."]
