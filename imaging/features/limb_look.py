@@ -82,6 +82,7 @@ def limb_look(pictures: Pictures, curved: Curved, outline: LimbOutline) -> LimbL
         good &= (np.abs(contrast) <= _STEEPER * step) & (_STEEPER * np.abs(contrast) >= step)
         good &= (contrast > 0) == (near > beyond)
         good &= np.maximum(inside.max(-1), beyond) <= sensor.headroom(scene.noise)
+        good &= scene.camera.aperture_radius == 0  # a cone of light touches a round wall in many places
     squared = np.where(seen, np.where(good, contrast, step) ** 2, 0.0)
     shift = shift + _sampled(pictures, outline)
     return LimbLook(np.where(good, shift, 0.0), squared, noise, good)

@@ -111,6 +111,7 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     good &= np.abs(sides[1] - sides[0]) >= _KNOWN * sides.max(0)
     good &= sides.max(0) <= sensor.headroom(scene.noise)
     good &= _steepest(levels, where, crossing, slope, scene.locator.window_px / width)
+    good &= scene.camera.aperture_radius == 0  # of a cone of light the wall beside takes a part that is not known
     shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
     noise = np.broadcast_to(noise, sides.shape).mean(0)
     squared = np.nan_to_num(slope) ** 2

@@ -17,10 +17,11 @@ from imaging.blurred.clipped_step import clipped
 from imaging.blurred.segment import Segments, second_and_third
 from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.features.measurand import Measurands, corner_response, measurands, normals
+from imaging.features.projected_edges import edge_ends
 from imaging.features.sampling import sampled_line
-from imaging.geometry.lens import lens_jacobian
+from imaging.geometry.lens import confusion, lens_jacobian
 from imaging.geometry.lens import recorded as recorded_at
-from imaging.geometry.projection import edge_points
+from imaging.geometry.projection import depth, edge_points
 from imaging.light.appearance import is_plain, side_signals
 from imaging.light.between import is_exchanged
 from imaging.light.sheets import printed
@@ -41,6 +42,7 @@ NEGLIGIBLE = 0.25  # of the predicted ones, so that what the prediction leaves o
 _FARTHEST = 0.25  # px that a crossing may be off: beyond, another one may be the steepest
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length: where it is asked where its light comes from
 _MOSTLY, _FELT, _CHANGES = 0.5, 0.05, 0.1  # parts of a side's light, and of the contrast, twice
+_MOST_CONFUSION = 0.5  # px, radius: beyond, rendered edges are found some tenths of a standard deviation off
 _JUMP = 0.2  # of the contrast, that neighbouring places on an edge may differ by
 _STEEPER = 0.1  # by which the slope at the crossing may differ from a lone step's: the variance then does by a fifth
 
@@ -87,8 +89,9 @@ def bias(pictures: Pictures) -> Bias:
 def cluttered(pictures: Pictures) -> np.ndarray:
     """Which edges have the status ``clutter``, bool, shape (..., E): the one rule of planner and measurement.
 
-    What lies around the edge disturbs its crossings, or a quantity's bias is above a quarter of its standard deviation
-    and the edge's share in it is no less than an equal one.
+    What lies around the edge disturbs its crossings, a cone of light that is so wide is partly taken by what is beside
+    it, or a quantity's bias is above a quarter of its standard deviation and the edge's share in it is no less than an
+    equal one.
     """
     found = bias(pictures)
     limit = NEGLIGIBLE * np.sqrt(calibrated(pictures).variances)
@@ -96,7 +99,17 @@ def cluttered(pictures: Pictures) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         biased = np.abs(found.values) > limit
         large = np.abs(found.shares) >= (limit / equal)[..., None]
-    return found.disturbed | (biased[..., None] & large).any(-2)
+    return found.disturbed | _defocused(pictures) | (biased[..., None] & large).any(-2)
+
+
+def _defocused(pictures: Pictures) -> np.ndarray | bool:
+    """Which edges have an end whose circle of confusion is wide, bool, shape (..., E)."""
+    scene = pictures.scene
+    if scene.camera.aperture_radius == 0:
+        return False
+    away = depth(edge_ends(scene, measurands(pictures).view.names), pictures.sensors, scene.camera)
+    wide = confusion(scene.camera, away) > _MOST_CONFUSION
+    return wide.reshape(*wide.shape[:-1], -1, 2).any(-1)
 
 
 def _in_blocks(pictures: Pictures) -> Bias:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.features.locator import edge_blur
+from imaging.features.projected_edges import circles
 from imaging.geometry.lens import confusion, lens_jacobian, recorded
 from imaging.geometry.projection import depth, edge_points, project_ideal
 from imaging.pictures import Pictures
@@ -66,10 +67,13 @@ class DepthOfField(Effect):
     def influence(self, pictures: Pictures) -> Influence:
         """A disc of radius r adds r^2 / 4 to the blur; it is an even blur only as far as r is small beside it.
 
-        The edge moves by shading, and by up to r^2 / 4 of a pixel where the blur changes along it.
+        The edge moves by shading, and by up to r^2 / 4 of a pixel where the blur changes along it. Of circles and
+        curved surfaces it is not told, for their walls take part of the cone of light.
         """
         scene = pictures.scene
         camera = scene.camera
+        if circles(scene):
+            return EVERYTHING
         ends = edge_points(scene.solid, required(scene), np.linspace(0, 1, 9)).reshape(-1, 3)
         z = depth(ends, pictures.sensors, camera)
         if (z <= 0).any():

@@ -57,5 +57,5 @@ def test_a_fit_needs_a_pinhole():
     block = scenes.load("task1")
     lens = {"kind": "telecentric", "width": 256, "height": 240, "magnification": 0.03, "pixel_pitch_um": 20.0,
             "working_distance_mm": 1000.0, "look_at": block.camera.look_at}  # fmt: skip
-    with pytest.raises(InvalidInput, match="camera.kind must be pinhole for a fit, .* got telecentric"):
+    with pytest.raises(InvalidInput, match=r"camera.kind must be pinhole for a fit, .* got telecentric"):
         measure.fit(block.with_(camera=lens), [np.zeros((240, 256))])

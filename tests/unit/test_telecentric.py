@@ -382,3 +382,20 @@ def test_what_is_out_of_focus_is_as_blurred_in_a_render_as_is_told():
     confusion = float(signed_confusion(told.camera, np.array(107.0)))
     assert confusion == pytest.approx(20 * 3 * 0.02 / (1 - 0.02**2) ** 0.5, rel=1e-12)
     assert spread == pytest.approx(0.5**2 + confusion**2 / 4 + 1 / 12 + 1 / 12, rel=0.02)  # and of the difference
+
+
+@pytest.mark.parametrize(("aperture", "status"), [(0.0, "ok"), (0.02, "clutter")])
+def test_what_a_cone_of_light_meets_beside_a_rim_is_left_to_a_simulation(plate, aperture, status):
+    """The bore's wall takes part of it: 25 um of its diameter in a render, where a parallel beam leaves none."""
+    told = planner.predict(plate.with_(camera={"numerical_aperture": aperture}), (0, 90), ())
+    assert told.status == status
+
+
+def test_straight_edges_far_out_of_focus_are_left_to_a_simulation():
+    """Beyond half a pixel of confusion: of a block that reaches 9 cm beyond the working plane."""
+    block = scenes.load("task1")
+    found = []
+    for aperture in (0.0, 0.001, 0.02):
+        lens = {**WIDE, "look_at": block.camera.look_at, "exposure": 200.0, "numerical_aperture": aperture}
+        found.append(planner.predict(block.with_(camera=lens), (40, 30), (15, 270)).status)
+    assert found == ["ok", "ok", "clutter"]

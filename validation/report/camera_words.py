@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from imaging.sensor import full_scale, recorded
-from scenes import Noise, Scene
+from scenes import Camera, Noise, Scene, Telecentric
 
 
 def told(scene: Scene) -> str:
@@ -21,6 +21,24 @@ def told(scene: Scene) -> str:
     scale = camera.focal_px / camera.distance
     image = f"{camera.width} x {camera.height} px, {scale:.3g} px per {scene.units} at the part"
     return f"{image}, noise sigma {_noise(scene.noise)}"
+
+
+def lens(camera: Camera, unit: str) -> str:
+    """What a telecentric lens is, in a line; nothing of a pinhole.
+
+    >>> import scenes
+    >>> lens(scenes.load("telecentric_plate").camera, "mm")
+    'Telecentric lens of magnification 0.18, chief rays parallel'
+    >>> lens(scenes.load("task1").camera, "cm")
+    ''
+    """
+    if not isinstance(camera, Telecentric):
+        return ""
+    angle = camera.telecentricity_deg
+    told = f"Telecentric lens of magnification {camera.magnification:g}, chief rays "
+    told += f"inclined by {angle:g} degrees at the image's corner" if angle else "parallel"
+    deep = camera.depth_of_field(1.0)
+    return f"{told}, {deep:.3g} {unit} deep within 1 px of blur" if math.isfinite(deep) else told
 
 
 def _noise(noise: Noise) -> str:

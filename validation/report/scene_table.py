@@ -15,6 +15,7 @@ from scenes.measurands.measurands import quantities_of
 from scenes.parts.recognised import Recognised, cylinders
 from scenes.parts.solid import Circle, Edge, Solid
 from scenes.results import picked
+from validation.report import camera_words
 from validation.report.cells import table, zone
 from validation.strict_json import plain
 
@@ -78,6 +79,7 @@ def report(scene: Scene) -> Group:
         Text(
             f"{scene.title or scene.name}\n"
             f"Object {size} {unit}, field of view {view} {unit} at {camera.distance:g} {unit}"
+            + "".join(f"\n{each}" for each in (camera_words.lens(camera, unit),) if each)
             + "".join(f"\nMended: {each}" for each in scene.solid.mended)
         )
     ]
