@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -173,3 +175,11 @@ def test_an_mtf_is_a_blur() -> None:
     lens = ListedLens(name="L", kind="entocentric", focal_length_mm=25.0, f_number=2.0, mtf=((50.0, contrast),))
     assert lens.aberrations_um(500.0, 1e-6) == pytest.approx(3.0, rel=1e-9)
     assert lens.aberrations_um(500.0, 2.0) < 3.0
+
+
+def test_the_page_tells_of_every_key() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "catalogue.md").read_text()
+    for kind in (ListedSensor, ListedLens, ListedLight):
+        section = page.split(f"## `[[{kind.table}]]`")[1].split("\n## ")[0]
+        told = re.findall(r"^\| `(\w+)`\*? \|", section, re.M)
+        assert sorted(told) == sorted(kind.model_fields)
