@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -120,13 +120,17 @@ def plan_capability(
     return CapabilityPlan(*found, pairs=len(grid.sensors) * len(grid.lights))
 
 
-def systematic(scene: Scene, sensor: np.ndarray, given: tuple[Source, ...]) -> np.ndarray:
-    """Variance of each quantity by the inputs that move places in the image, at a sensor's pose (2,), shape (M,)."""
+def systematic(scene: Scene, sensor: np.ndarray, given: tuple[Source, ...], *, closely: bool = True) -> np.ndarray:
+    """Variance of each quantity by the inputs that move places in the image, at a sensor's pose (2,), shape (M,).
+
+    Not ``closely``: rims count as they do in a search, which is 25 times faster and differs by a few per cent.
+    """
     still = tuple(each for each in given if each.kind == "geometry")
     count = len(scene.quantities)
     if not still:
         return np.zeros(count)
     pictures = Pictures.of(scene, sensor, _anywhere(scene))
+    pictures = pictures if closely else replace(pictures, closely=False, _known={})
     with np.errstate(all="ignore"):
         features = Features(pictures)
         slopes = sensitivities(features, still, biased=False)

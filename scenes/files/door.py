@@ -16,6 +16,7 @@ from scenes.errors import InvalidInput
 
 MOST_TEXT = 1 << 20  # bytes of a scene, a campaign or a lens
 MOST_RESULT = 64 << 20  # bytes of a result.json: some 20,000 settings
+MOST_TABLE = 16 << 20  # bytes of a catalogue: some 30,000 parts
 MOST_DEPTH = 32  # tables and lists in each other
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MOST_DEPTH}}}", re.ASCII)
@@ -86,8 +87,8 @@ def read_bytes(path: Path, most: int) -> bytes:
     return data
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """The document of a TOML file.
+def read_toml(path: Path, most: int = MOST_TEXT) -> dict[str, Any]:
+    """The document of a TOML file of at most so many bytes.
 
     Raises
     ------
@@ -95,7 +96,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         As of `opened`; if it is no TOML in UTF-8, or holds what is nested more than `MOST_DEPTH` deep, a whole number
         of more than 64 bits, or a key of more parts.
     """
-    return _document(path, MOST_TEXT, "TOML", _toml)
+    return _document(path, most, "TOML", _toml)
 
 
 def read_json(path: Path) -> Any:

@@ -22,7 +22,8 @@ pytestmark = pytest.mark.render
 
 OPEN = (
     "failures", "parameters", "correlation", "classic_verdicts", "seconds", "paper_real", "global", "guarded",
-    "omitted", "quality", "status", "left_out[]", "lights[]", "circles[]", "cylinders[]", "surfaces[]",
+    "omitted", "quality", "status", "left_out[]", "pairs_left_out",
+    "left_out", "lights[]", "circles[]", "cylinders[]", "surfaces[]",
 )  # fmt: skip
 POSES = ("--sensor", "30,135", "--light", "15,315")
 ASKED = {  # the least work of each command; by the heading of docs/json.md where that has further words
@@ -44,12 +45,41 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "calibrate-camera": ("0.png", "1.png", "2.png", "--square", "25", "--model", "k1,k2,p1,p2"),
     "budget": ("calibrated_rig", "--monte-carlo", "--reach", "0.005"),
     "msa": ("calibrated_rig",),
+    "catalogue": ("check", "parts.toml"),
+    "design": ("calibrated_rig", "--catalogue", "parts.toml", "--own-light", "--lens-blur", "2"),
     "cost": ("small.toml", "--budget", "1s", "--out", "cost"),
     "explore": ("small.toml",),
     "hard": ("--area", "reflectance"),
     "report": ("finished",),
     "compare": ("finished", "changed.json"),
 }
+
+
+PARTS = """title = "Two cameras and a lens"
+
+[[sensors]]
+name = "one"
+resolution = [1280, 1024]
+pixel_pitch_um = 4.5
+bits = 12
+saturation_capacity_e = 15000
+temporal_dark_noise_e = 4
+quantum_efficiency = 0.6
+mount = ["C"]
+
+[[sensors]]
+name = "two"
+quantum_efficiency = 60
+
+[[lenses]]
+name = "25 mm"
+kind = "entocentric"
+focal_length_mm = 25
+f_number = 2
+f_number_max = 16
+format = '2/3"'
+mount = "C"
+"""
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +94,7 @@ def folder(tmp_path_factory):
         image = SMALL.image(pose, 2) + rng.normal(0, 2, SMALL.size[::-1])
         cv2.imwrite(str(made / f"{i}.png"), np.clip(np.rint(image), 0, 255).astype(np.uint8))
     trimesh.creation.box((30, 20, 10)).export(made / "box.stl")
+    (made / "parts.toml").write_text(PARTS)
     room.run.rename(made / "finished")
     result = json.loads((made / "finished/result.json").read_text())
     result["settings"][0]["empirical"] *= 100

@@ -24,6 +24,8 @@ COMMANDS = {
     "calibrate": ("calibrate", "Measure the position noise of every locator."),
     "calibrate-camera": ("calibrate_camera", "Calibrate a camera from photographs of a chessboard."),
     "budget": ("budget", "The uncertainty of every measurand: all sources, shares, and U = k u."),
+    "catalogue": ("catalogue", "Check a catalogue of sensors, lenses and lights for contradictions."),
+    "design": ("design", "Which camera, lens and light to buy for a drawing's tolerances, at the least cost."),
     "msa": ("msa", "Measurement system analysis: %GRR, ndc, Cg, Cgk predicted, and a study beside them."),
     "cost": ("cost", "Measure what each parameter costs and gives on this machine."),
     "explore": ("explore", "A page on which camera and lights are dragged and the prediction answers."),

@@ -1,0 +1,144 @@
+"""What a design is worth in rendered pictures, and its station as a scene's file."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import scenes
+from planner.budgeting.budgets import SceneBudget
+from planner.designing.search import Design, Offer
+from planner.designing.stations import station
+from scenes import InvalidInput, Picture, Scene
+from scenes.files.door import read_toml
+from scenes.files.written import edited
+from scenes.status import is_trusted
+from scenes.uncertain import taken_out
+from validation.budgets import budget_of
+
+if TYPE_CHECKING:
+    from validation.batch.result import Validation
+
+_TRIED = 3  # stations that are rendered, where rendering contradicts the ones before
+_DERIVED = ("distance", "focal_px")  # of a camera's data sheet
+
+
+@dataclass(frozen=True, eq=False)
+class StationProof:
+    """A station's budget with biases as renders tell them, and its noise in noisy pictures.
+
+    Attributes
+    ----------
+    offer : Offer
+        The station.
+    budget : SceneBudget
+    ratio : float
+        Largest U over what is allowed.
+    run : Validation or None
+        Of the noisy pictures, where there are at least two.
+    """
+
+    offer: Offer
+    budget: SceneBudget
+    ratio: float
+    run: Validation | None
+
+    @property
+    def trusted(self) -> bool:
+        """Whether every value may be signed."""
+        return all(map(is_trusted, self.budget.statuses))
+
+    @property
+    def holds(self) -> bool:
+        """Whether every value may be signed, with the U that is allowed, and noise is as predicted."""
+        return self.trusted and self.ratio <= 1 and (self.run is None or bool(self.run.verdict.agrees))
+
+
+def posed(design: Design, offer: Offer) -> Scene:
+    """A station with its places as its one setting."""
+    scene = station(design.problem.scene, offer.rated.settings)
+    setting: dict[str, Any] = {"sensor": offer.rated.sensor}
+    if scene.free:
+        setting["light"] = offer.rated.light
+    return scene.with_(settings=(setting,))
+
+
+def prove(design: Design, offer: Offer, renders: int, report: Any = None) -> StationProof:
+    """Render a station, take its biases off, and measure so many noisy pictures."""
+    from validation.batch.job import run
+
+    scene = posed(design, offer)
+    picture = Picture.of(scene, offer.rated.sensor, offer.rated.light)
+    found = budget_of(picture, design.problem.wishes.p, rendered=True)
+    ratio = max(each.U / most for each, most in zip(found.measurands, design.problem.allowed, strict=True))
+    made = None
+    if renders > 1:
+        with TemporaryDirectory() as directory:
+            made = run(scene, renders, out=Path(directory) / "run", workers=1, fresh=True, progress=report)
+    return StationProof(offer, found, float(ratio), made)
+
+
+def proven(design: Design, renders: int, report: Any = None) -> tuple[Design, tuple[StationProof, ...]]:
+    """The design with the first station that rendering bears out: the best, or the next of the front that meet all.
+
+    Without any the design stays as it is, and its proofs say so.
+    """
+    if design.best is None:
+        return design, ()
+    dearer = [each for each in design.front if each.cost >= design.best.cost and each.ratio <= 1]
+    tried = [design.best, *(each for each in dearer if each.rated is not design.best.rated)][:_TRIED]
+    proofs: list[StationProof] = []
+    for offer in tried:
+        proofs.append(prove(design, offer, renders, report))
+        if proofs[-1].holds:
+            return replace(design, best=offer), tuple(proofs)
+    return design, tuple(proofs)
+
+
+def write(design: Design, source: str, path: Path) -> Scene:
+    """Write the station that was found as a scene, the part and all that is asked of it as they were.
+
+    Raises
+    ------
+    InvalidInput
+        If nothing was found, or the file cannot be written.
+    """
+    if design.best is None:
+        raise InvalidInput("--write must be given where a station was found, got none")
+    origin, scene = scenes.find(source), posed(design, design.best)
+    document = taken_out(read_toml(origin))
+    names = " + ".join(design.best.rated.names)
+    told = {
+        "title": f"{design.problem.scene.title or design.problem.scene.name}: {names}",
+        "camera": _camera(scene), "noise": scene.noise.model_dump(mode="json", exclude_unset=True),
+        "settings": [each.model_dump(mode="json", exclude_none=True) for each in scene.settings],
+        "uncertain": [each.model_dump(mode="json", exclude_unset=True, exclude_none=True) for each in scene.uncertain],
+    }  # fmt: skip
+    for name in ("light", "lights"):
+        document.pop(name, None)
+    told["lights"] = [each.model_dump(mode="json", exclude_unset=True) for each in scene.lights]
+    if scene.uncertainty.covariance is not None:
+        covariance = scene.uncertainty.covariance.model_dump(mode="json")
+        document["uncertainty"] = {**document["uncertainty"], "covariance": covariance}
+    document = {key: value for key, value in (document | told).items() if value not in ([], {})}
+    _moved(document, origin.parent, path.parent)
+    try:
+        path.write_text(edited(origin.read_text("utf-8"), document | {"name": path.stem}), "utf-8")
+    except OSError as error:
+        raise InvalidInput(f"--write must be a writable file, got {path} ({error.strerror})") from None
+    return scenes.load(path)
+
+
+def _camera(scene: Scene) -> dict[str, Any]:
+    table = scene.camera.model_dump(mode="json", exclude_unset=True)
+    return {key: value for key, value in table.items() if key not in _DERIVED}
+
+
+def _moved(document: dict[str, Any], source: Path, target: Path) -> None:
+    """Files that the scene names, from where the new file lies; changed in place."""
+    for table in (document.get("object", {}), *document.get("textures", [])):
+        if isinstance(table.get("file"), str):
+            table["file"] = os.path.relpath(source.resolve() / table["file"], target.resolve())
