@@ -21,7 +21,7 @@ from scenes import Picture
 
 _SIDE, _MOST = 8, 5000  # px of a block; of blocks: larger ones in larger images
 _OF_RAYS = 1.5  # of one image's variance by rays: of two on the mean, and of a picture that is a render
-_LEAST = 9  # blocks of a region
+_LEAST = 16  # blocks of a region, and that tell of an input
 _NEAR = 5  # blocks a side over which rays scatter alike
 _STEEP = 1.0  # change over a pixel, in the noise's standard deviation, that is an edge's
 _NEAR_END = 4.0  # standard deviations of noise below the end of the scale
@@ -98,14 +98,28 @@ class Adjustment:
         own = _means(deviation[None] ** 2, side)[0, at[:, 0], at[:, 1]] / side**2
         region = regions[tuple(at.T)]
         own += _OF_RAYS * _nearby((first[:, 0] - second[:, 0]) ** 2 / 2, at, region, regions.shape)
+        design = [each[:, 2:] - each[:, 1:2] for each in (first, second)]
         made = cls(
-            side, at, np.concatenate([(first + second)[:, 2:] / 2 - (first + second)[:, 1:2] / 2, levels], 1),
-            region, own, np.zeros(0), np.zeros(0), noise.dark_level,
+            side, at, np.concatenate([(design[0] + design[1]) / 2, levels], 1), region, own, np.zeros(0), np.zeros(0),
+            noise.dark_level,
         )  # fmt: skip
-        one, other = (made._left(each[:, 2:] - each[:, 1:2]) for each in (first, second))
+        one, other = (made._left(each) * made._spread_out for each in design)
         told = [_products(one[region == each], other[region == each]) for each in made.regions]
         normal, spread = (np.array(each) for each in zip(*told, strict=True))
-        return replace(made, normal=normal, spread=spread)
+        columns = made.columns * np.append(made._spread_out, np.ones((len(at), 1)), 1)
+        return replace(made, columns=columns, normal=normal, spread=spread)
+
+    @property
+    def _spread_out(self) -> np.ndarray:
+        """Whether what each block's region tells of each input is told by many blocks, bool (n, k): what a few tell is
+        not asked, for they would fit whatever is wrong there."""
+        squares = self._left(self.columns[:, :-1].copy()) ** 2
+        found = np.zeros(squares.shape, bool)
+        for region in self.regions:
+            some = self.region == region
+            sums = squares[some].sum(0)
+            found[some] = sums**2 > _LEAST * (squares[some] ** 2).sum(0)
+        return found
 
     @property
     def regions(self) -> np.ndarray:
