@@ -32,6 +32,7 @@ from scenes import Camera, InvalidInput, Picture, Telecentric
 from scenes.numbers import with_number
 from scenes.parts.surfaces import Cone, Cylinder, Sphere, Torus
 from scenes.viewpoint import Viewpoint
+from validation.chain import Chain
 
 LOOK_AT = (3.0, -2.0, 1.5)
 ANGLES = (0.0, 0.15, -0.15, 2.0)  # degrees of the chief ray at the image's corner
@@ -399,3 +400,19 @@ def test_straight_edges_far_out_of_focus_are_left_to_a_simulation():
         lens = {**WIDE, "look_at": block.camera.look_at, "exposure": 200.0, "numerical_aperture": aperture}
         found.append(planner.predict(block.with_(camera=lens), (40, 30), (15, 270)).status)
     assert found == ["ok", "ok", "clutter"]
+
+
+def test_what_two_inputs_do_together_is_the_chains_second_order(plate):
+    """Of stations whose points are recorded anew, at one standard uncertainty of each; what is drawn has it once."""
+    level = plate.with_(camera={"look_at": (6.0, 9.0, 3.0), "telecentricity_deg": {"value": 0.0, "half_width": 0.1}})
+    found = budget(level, (0, 90))
+    chain, names = Chain(found), [source.name for source in found.sources]
+    curved = chain.expansion[2][0]
+    angle = names.index("camera.telecentricity_deg")
+    together = np.linalg.norm(np.delete(curved[angle], angle))
+    told = {row.source: row.contribution for row in found["bore"].contributions}["telecentricity x depth"]
+    assert told == pytest.approx(together, rel=2e-3)
+    assert told > 1e-4
+    drawn = {term.name: np.ones(1) for term in found.terms[0]}
+    added = chain.added(0, drawn)
+    assert chain.added(0, drawn | {"telecentricity x depth": np.zeros(1)}) == added
