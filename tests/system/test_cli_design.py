@@ -95,3 +95,13 @@ def test_a_budget_leaves_out_what_is_dearer(folder):
     cheap, dear = (json.loads(ice(*words, "--budget", budget, cwd=folder).stdout) for budget in ("600", "580"))
     assert (cheap["best"]["cost"], cheap["cost"]) == (590, "price")
     assert dear["searched"]["pairs_left_out"] == {"budget": 1}
+
+
+@pytest.mark.render
+def test_a_station_is_borne_out_by_rendering(folder):
+    told = json.loads(ice(*ASKED, "--k", "2", "--renders", "20", cwd=folder).stdout)
+    proof = told["proofs"][0]
+    assert told["signed"]
+    assert proof["holds"]
+    assert proof["verdict"].startswith("agree")
+    assert proof["statuses"] == ["ok"]
