@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
 from planner.designing.search import Design
 from validation.report.canvas import TEXT, WIDTH, plt, save
 from validation.report.design_words import u_over_t
@@ -23,6 +25,9 @@ def draw(found: Design, currency: str, path: Path) -> Path:
     if wishes.false_acceptance is None:
         axis.axhline(1 / wishes.k, color="0.4", ls="--", label=f"asked: 1 / {wishes.k:g}", zorder=0)
     axis.set_yscale("log")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
+    axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.yaxis.set_minor_formatter(NullFormatter())
     axis.set_xlabel(f"cost [{currency}]" if found.priced else "pixels of the camera [Mpx]", fontsize=TEXT)
     axis.set_ylabel("worst U over half of the tolerance zone", fontsize=TEXT)
     axis.legend(fontsize=TEXT)
