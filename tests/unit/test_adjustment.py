@@ -58,10 +58,10 @@ def test_errors_of_inputs_are_as_told(picture):
     told = np.sqrt(np.diag(adjustment.covariance))
     assert (told < 0.7).all()
     assert (told > 0.12).all()
-    pulls = _pulls(adjustment, rng, 300)
-    assert np.sqrt((pulls**2).mean(0)) == pytest.approx(np.ones(3), abs=0.15)
+    pulls = _pulls(adjustment, rng, 150)
+    assert np.sqrt((pulls**2).mean(0)) == pytest.approx(np.ones(3), abs=0.2)  # 0.06 by chance
     noisy = Adjustment.of(_sets(CHANGES, rng, level=0.5, alike=1.0), picture)  # its columns are mostly noise
-    pulls_of_noisy = _pulls(noisy, rng, 200)
+    pulls_of_noisy = _pulls(noisy, rng, 80)
     assert np.sqrt((pulls_of_noisy**2).mean(0)).max() < 1.25
     assert (np.sqrt(np.diag(noisy.covariance)) < 0.8).any()
     alone = (pulls * told).std(0)  # negative control: no input is known as well as half of that
@@ -81,7 +81,7 @@ def test_noise_of_rays_tells_nothing(picture):
 def test_faces_that_reflect_otherwise_tell_nothing_wrong(picture):
     rng = np.random.default_rng(3)
     adjustment = Adjustment.of(_sets(CHANGES, rng), picture)
-    pulls = _pulls(adjustment, rng, 150, faces=0.05)
+    pulls = _pulls(adjustment, rng, 80, faces=0.05)
     assert np.sqrt((pulls**2).mean(0)).max() < 1.3
 
 
@@ -89,7 +89,7 @@ def test_a_model_that_does_not_fit_is_believed_less(picture):
     """Blotches of one per cent do as much as the inputs."""
     rng = np.random.default_rng(5)
     adjustment = Adjustment.of(_sets(CHANGES, rng), picture)
-    pulls = _pulls(adjustment, rng, 100, blotches=0.01)
+    pulls = _pulls(adjustment, rng, 60, blotches=0.01)
     sure = np.sqrt(np.diag(adjustment.covariance))
     _, covariance = adjustment.inputs(BASE + (BASE - 16) * _blotches(rng, 0.01))
     told = np.sqrt(np.diag(covariance))
