@@ -29,7 +29,7 @@ _GROUPS = 1, 2, 4, 8, 16  # blocks a side whose sums tell whether they fit
 _ENOUGH = 4  # sums for each input, to tell it
 _TIMES = 3  # that regions' misfits are found anew
 _CHANCE = 5.0  # standard deviations of products of noise, which are no information
-_LINEAR = 0.1  # of what a standard uncertainty does, that is not told by a multiple of it
+_LINEAR = 0.3  # of what a standard uncertainty does, that is not told by a multiple of it, or by noise of rays missed
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+import measure.adjustment as adjustments
 import scenes
 from measure.adjustment import Adjusted, Adjustment
 from scenes import Picture
@@ -17,6 +18,12 @@ CHANGES = np.array([
     0.3 * (Y - ROWS / 2) / ROWS,  # a lamp that stands elsewhere
     0.3 * (X - COLUMNS / 2) / COLUMNS,
 ])  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def linear(monkeypatch):
+    """What these inputs do is told by multiples."""
+    monkeypatch.setattr(adjustments, "_LINEAR", 0.1)
 
 
 @pytest.fixture(scope="module")
@@ -111,3 +118,9 @@ def test_sources_add_up_to_the_joint_uncertainty(picture):
     assert told["reflectance"][:2] ** 2 + told["light_place"][:2] ** 2 == pytest.approx(joint[:2])
     assert (told["reflectance"][1], told["light_place"][1]) == (0.0, 0.0)
     assert np.isnan(told["light_place"][2])
+
+
+def test_no_input_is_known_better_than_a_multiple_of_its_step(picture, monkeypatch):
+    monkeypatch.setattr(adjustments, "_LINEAR", 0.3)
+    covariance = Adjustment.of(_sets(10 * CHANGES, np.random.default_rng(6)), picture).covariance
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(np.full(3, 0.3), abs=0.02)
