@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -69,6 +69,11 @@ class Pictures:
     def at(self, sensors: np.ndarray, lights: tuple[np.ndarray, ...]) -> Pictures:
         """The same scene from other poses, looked at as closely."""
         return Pictures(self.scene, sensors, lights, self.closely, self.roughly)
+
+    @property
+    def glanced(self) -> Pictures:
+        """The same, looked at as the search does with many."""
+        return self.once("glanced", lambda: replace(self, closely=False, _known={}))
 
     @property
     def sensor_at(self) -> np.ndarray:

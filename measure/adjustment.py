@@ -103,17 +103,17 @@ class Adjustment:
             side, at, np.concatenate([(design[0] + design[1]) / 2, levels], 1), region, own, np.zeros(0), np.zeros(0),
             noise.dark_level,
         )  # fmt: skip
-        one, other = (made._left(each) * made._spread_out for each in design)
+        asked = made._by_many_blocks()
+        one, other = (made._left(each) * asked for each in design)
         told = [_products(one[region == each], other[region == each]) for each in made.regions]
         normal, spread = (np.array(each) for each in zip(*told, strict=True))
-        columns = made.columns * np.append(made._spread_out, np.ones((len(at), 1)), 1)
+        columns = np.concatenate([made.columns[:, :-1] * asked, levels], 1)
         return replace(made, columns=columns, normal=normal, spread=spread)
 
-    @property
-    def _spread_out(self) -> np.ndarray:
+    def _by_many_blocks(self) -> np.ndarray:
         """Whether what each block's region tells of each input is told by many blocks, bool (n, k): what a few tell is
         not asked, for they would fit whatever is wrong there."""
-        squares = self._left(self.columns[:, :-1].copy()) ** 2
+        squares = self._left(self.columns[:, :-1]) ** 2
         found = np.zeros(squares.shape, bool)
         for region in self.regions:
             some = self.region == region

@@ -302,8 +302,7 @@ def _looked_at(picture: Picture, roughly: bool) -> Pictures:
 
 def glanced(picture: Picture) -> Pictures:
     """One picture to be glanced at, as the search does with many; one object for equal pictures."""
-    pictures = Pictures.of(picture)
-    return pictures.once("glanced", lambda: replace(pictures, closely=False, _known={}))
+    return Pictures.of(picture).glanced
 
 
 def _of_locator(pictures: Pictures, model: str) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:

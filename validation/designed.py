@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,9 +13,9 @@ from planner.designing.search import Design, Offer
 from planner.designing.stations import station
 from scenes import InvalidInput, Picture, Scene
 from scenes.files.door import read_toml
-from scenes.files.written import edited
 from scenes.status import is_trusted
 from scenes.uncertain import taken_out
+from validation import copied_scene
 from validation.budgets import budget_of
 
 if TYPE_CHECKING:
@@ -124,21 +123,9 @@ def write(design: Design, source: str, path: Path) -> Scene:
         covariance = scene.uncertainty.covariance.model_dump(mode="json")
         document["uncertainty"] = {**document["uncertainty"], "covariance": covariance}
     document = {key: value for key, value in (document | told).items() if value not in ([], {})}
-    _moved(document, origin.parent, path.parent)
-    try:
-        path.write_text(edited(origin.read_text("utf-8"), document | {"name": path.stem}), "utf-8")
-    except OSError as error:
-        raise InvalidInput(f"--write must be a writable file, got {path} ({error.strerror})") from None
-    return scenes.load(path)
+    return copied_scene.write(document, origin, path, "--write")
 
 
 def _camera(scene: Scene) -> dict[str, Any]:
     table = scene.camera.model_dump(mode="json", exclude_unset=True)
     return {key: value for key, value in table.items() if key not in _DERIVED}
-
-
-def _moved(document: dict[str, Any], source: Path, target: Path) -> None:
-    """Files that the scene names, from where the new file lies; changed in place."""
-    for table in (document.get("object", {}), *document.get("textures", [])):
-        if isinstance(table.get("file"), str):
-            table["file"] = os.path.relpath(source.resolve() / table["file"], target.resolve())

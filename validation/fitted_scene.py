@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import scenes
 from measure.fitting.result import Fit
-from scenes import InvalidInput, Lens
+from scenes import Lens
 from scenes.files.door import read_toml
-from scenes.files.written import edited
 from scenes.numbers import number_at
 from scenes.scene import Scene
 from scenes.uncertain import taken_out
+from validation import copied_scene
 
 _CAMERA = ("distance", "roll_deg", "exposure", "blur_px", "focal_px")
 _NOISE = ("sigma", "gain", "dark_level")
@@ -32,13 +31,8 @@ def write(found: Fit, source: str, path: Path) -> Scene:
     document = taken_out(read_toml(origin))  # what numbers were uncertain by, the photographs have told
     document.pop("uncertain", None)
     document = _document(found, document)
-    _moved(document, origin.parent, path.parent)
     head = f"# {origin.name} as photographs show it: camera, noise and settings were fitted (status {found.status}).\n"
-    try:
-        path.write_text(head + edited(origin.read_text("utf-8"), document | {"name": path.stem}), "utf-8")
-    except OSError as error:
-        raise InvalidInput(f"--output must be a writable file, got {path} ({error.strerror})") from None
-    return scenes.load(path)
+    return copied_scene.write(document, origin, path, "--output", head)
 
 
 def _document(found: Fit, document: dict[str, Any]) -> dict[str, Any]:
@@ -52,13 +46,3 @@ def _document(found: Fit, document: dict[str, Any]) -> dict[str, Any]:
     noise = document["noise"] | {key: number_at(scene, f"noise.{key}") for key in _NOISE}
     settings = [setting.model_dump(mode="json", exclude_none=True) for setting in scene.settings]
     return document | {"camera": camera, "noise": noise, "settings": settings, "same_scale": []}
-
-
-def _moved(document: dict[str, Any], source: Path, target: Path) -> None:
-    """Files that the scene names, from where the new file lies; changed in place."""
-    for table in (document.get("object", {}), *document.get("textures", [])):
-        if isinstance(table.get("file"), str):
-            table["file"] = os.path.relpath(source / table["file"], target.absolute())
-    told = document.get("uncertainty", {})
-    if isinstance(told.get("covariance"), str):
-        told["covariance"] = os.path.relpath(source / told["covariance"], target.absolute())

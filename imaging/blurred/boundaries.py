@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from imaging.blurred.segment import Segments
-from imaging.geometry.projection import camera_frame, divisor, edge_points, facing, from_axis
+from imaging.geometry.projection import camera_frame, divisor, edge_points, facing, from_axis, in_space
 from imaging.geometry.visibility import boundaries
 from imaging.geometry.visibility import seen as visible_at
 from imaging.light.appearance import face_signal, is_plain, side_signals, sides_of_one
@@ -194,7 +194,7 @@ def _face_fields(pictures: Pictures, names: tuple[str, ...], picture, edge, face
     axes = camera_frame(camera, of_each.sensors)
     ends = np.array([solid.edge(name).ends for name in names])
     near, far = (divisor(solid.vertices[ends[:, k]], pictures.sensors, camera)[picture, edge][:, None] for k in (0, 1))
-    spatial = _SUPPORT * near / (far + _SUPPORT * (near - far))
+    spatial = in_space(_SUPPORT, near, far)
     start, stop = (solid.vertices[ends[edge, k]][:, None] for k in (0, 1))
     points = start + spatial[..., None] * (stop - start)
     pixel = (near + spatial * (far - near))[..., None] / camera.focal_px
@@ -258,9 +258,8 @@ def _in_one(pictures: Pictures, edges: Sequence[Edge], which: np.ndarray, fracti
     vertices, alone = pictures.scene.solid.vertices, pictures.at(*_of_each(pictures, 0))
     ends = vertices[np.array([edge.ends for edge in edges], int).reshape(-1, 2)]
     near, far = np.moveaxis(divisor(ends, alone.sensors, pictures.scene.camera)[which], 1, 0)
-    spatial = fractions * near / (far + fractions * (near - far))
     start, stop = np.moveaxis(ends[which], 1, 0)
-    return sides_of_one(alone, edges, which, start + spatial[:, None] * (stop - start)).T
+    return sides_of_one(alone, edges, which, start + in_space(fractions, near, far)[:, None] * (stop - start)).T
 
 
 def _shown(pictures: Pictures, picture: np.ndarray, other: np.ndarray, nearest: np.ndarray) -> np.ndarray:
@@ -278,7 +277,7 @@ def _in_space(pictures: Pictures, solid: Solid, edge: Edge, picture: np.ndarray,
     near, far = (
         divisor(solid.vertices[[end]], pictures.sensors, pictures.scene.camera)[picture, 0] for end in edge.ends
     )
-    return fractions * near / (far + fractions * (near - far))
+    return in_space(fractions, near, far)
 
 
 def _of_each(pictures: Pictures, picture: np.ndarray):

@@ -147,6 +147,15 @@ def divisor(points: np.ndarray, poses: np.ndarray, camera: Camera) -> np.ndarray
     return camera.divisor(depth(points, poses, camera))
 
 
+def in_space(fractions: np.ndarray, near: np.ndarray, far: np.ndarray) -> np.ndarray:
+    """Fractions of a line in space from those of its image, by the divisors at both ends; of broadcast shapes.
+
+    >>> float(in_space(0.5, 1.0, 3.0))
+    0.25
+    """
+    return fractions * near / (far + fractions * (near - far))
+
+
 def _along(points: np.ndarray, camera: Camera, axes: Frame) -> np.ndarray:
     return camera.distance + np.einsum("...ni,...i->...n", points - np.array(camera.look_at), axes.forward)
 

@@ -10,7 +10,7 @@ from imaging.features.locator import reach
 from imaging.features.measurand import Measurands, measurands, normals
 from imaging.features.projected_edges import ProjectedEdges, cut, edge_ends, end_divisors, image_fractions
 from imaging.geometry.lens import blur_at, lens_jacobian
-from imaging.geometry.projection import depth
+from imaging.geometry.projection import depth, in_space
 from imaging.geometry.visibility import longest_span
 from imaging.light.appearance import edge_contrast
 from imaging.light.backlight import backlights
@@ -79,7 +79,7 @@ def place_nodes(pictures: Pictures, view: ProjectedEdges, trims: np.ndarray) -> 
     t = length / 2 * np.concatenate([[-1], NODES, [1]])
     near, far = end_divisors(pictures.scene, view.names, pictures.sensors)
     fractions = (middle + t) / whole
-    spatial = fractions * near / (far + fractions * (near - far))
+    spatial = in_space(fractions, near, far)
     ends = depth(edge_ends(pictures.scene, view.names), pictures.sensors, camera)
     ends = ends.reshape(*ends.shape[:-1], len(view.names), 2)
     blur = blur_at(camera, ends[..., :1] + spatial * (ends[..., 1:] - ends[..., :1]))

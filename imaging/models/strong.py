@@ -14,7 +14,7 @@ import numpy as np
 
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, reach
 from imaging.features.projected_edges import ProjectedEdges, end_divisors
-from imaging.geometry.projection import edge_points
+from imaging.geometry.projection import edge_points, in_space
 from imaging.light.appearance import is_separable, side_signals
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
@@ -46,7 +46,7 @@ def strong_pieces(pictures: Pictures, view: ProjectedEdges) -> np.ndarray:
 def _strong_pieces(pictures: Pictures, view: ProjectedEdges) -> np.ndarray:
     scene, fractions = pictures.scene, (np.arange(_PLACES) + 0.5) / _PLACES
     near, far = end_divisors(scene, view.names, pictures.sensors)
-    spatial = fractions * near / (far + fractions * (near - far))
+    spatial = in_space(fractions, near, far)
     contrast = _over_noise(pictures, view.names, edge_points(scene.solid, view.names, spatial))
     clear = reach(scene.locator.scale_px, scene.camera.blur_px)
     lead = np.broadcast_shapes(contrast.shape[:-1], view.lengths.shape)

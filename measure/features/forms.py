@@ -15,6 +15,7 @@ from scipy import special
 from scipy.ndimage import binary_dilation, median_filter
 
 from imaging.features.measurand import measurands, normals
+from imaging.geometry.projection import in_space
 from imaging.models.form_law import CLEAREST, LEAST_CLEAR, FormLaw, every, form_law, residues
 from imaging.pictures import Pictures
 from measure.estimators.crossing import CrossingLocator
@@ -248,9 +249,7 @@ def _edge_tool(picture: Picture, quantity: Quantity, off: tuple[float, float]) -
     known = measurands(Pictures.of(picture))
     e = known.view.names.index(name)
     ends = known.seen.solid.vertices[list(known.seen.solid.edge(name).ends)]
-    near, far = known.seen.divisor(ends)
-    share = caliper.positions / caliper.length
-    share = share * near / (far + share * (near - far))
+    share = in_space(caliper.positions / caliper.length, *known.seen.divisor(ends))
     places = ends[0] + share[:, None] * (ends[1] - ends[0])
     unit = 1 / known.seen.per_unit(quantity.features[0], places, normals(known.view)[e])
     design = np.stack([np.ones(share.size), share - share.mean()], -1)

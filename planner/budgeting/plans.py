@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -130,9 +130,8 @@ def systematic(scene: Scene, sensor: np.ndarray, given: tuple[Source, ...], *, c
     if not still:
         return np.zeros(count)
     pictures = Pictures.of(scene, sensor, _anywhere(scene))
-    pictures = pictures if closely else replace(pictures, closely=False, _known={})
     with np.errstate(all="ignore"):
-        features = Features(pictures)
+        features = Features(pictures if closely else pictures.glanced)
         slopes = sensitivities(features, still, biased=False)
         u = np.array([each.told.u for each in still])
         spread = slopes * u

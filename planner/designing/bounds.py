@@ -14,9 +14,9 @@ import numpy as np
 from imaging.features.locator import kappa2
 from planner.designing.aspects import Aspect
 from planner.designing.evaluation import Problem
-from planner.designing.optics import BLUR, CIRCLE, DISTANCE, FIELD, MOUNT, noise_to_signal
+from planner.designing.optics import BLUR, CIRCLE, DISTANCE, FIELD, MOUNT, defocus_um, is_covered, noise_to_signal
+from scenes.cameras.diffraction import airy_um
 from scenes.catalogue import ListedLens, ListedSensor
-from scenes.catalogue.lens import airy_um
 from scenes.parts.solid import Solid
 from scenes.units import in_unit
 
@@ -84,7 +84,8 @@ def _seen(
     diagonals = np.array([each.diagonal for each in sensors])[:, None]
     most = np.minimum(wishes.farthest_mm, farthest)
     fails = [
-        ~mounts, diagonals > 1.02 * circles, tele & ~aspect.fits(half, np.broadcast_to(magnification, mounts.shape)),
+        ~mounts, ~is_covered(diagonals, circles),
+        tele & ~aspect.fits(half, np.broadcast_to(magnification, mounts.shape)),
         (far < max(wishes.nearest_mm, aspect.nearest_mm)) | (far > most), blur > wishes.blur_px,
     ]  # fmt: skip
     bound = _least_ratio(problem, aspect, sensors, far, scale, blur, tele)
@@ -104,7 +105,7 @@ def _least_blur(problem: Problem, aspect: Aspect, lenses: Sequence[ListedLens], 
         tele = np.array([each.is_telecentric for each in lenses])
         number = np.where(tele, stops, stops * (1 + scale))
         own = np.array([0.0 if each.mtf else problem.otherwise_um for each in lenses])
-        defocus = 1000 * scale**2 * aspect.half_depth_mm / number / 4
+        defocus = defocus_um(scale, aspect.half_depth_mm, number)
         found = np.minimum(found, np.sqrt(airy_um(_SHORTEST_NM, 1.0) ** 2 * number**2 + own**2 + defocus**2))
     return found
 

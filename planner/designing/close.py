@@ -24,7 +24,6 @@ from scenes import InvalidInput, Picture
 from scenes.lights import GLANCE, SMOOTH
 from scenes.status import MEASURED, NOT_VISIBLE
 
-UNKNOWN = NOT_VISIBLE
 _NODES = {"dome": SMOOTH}  # each way, that stand for a light
 
 
@@ -60,20 +59,20 @@ def look(problem: Problem, rated: Rated) -> Close:
     try:
         picture = Picture.of(scene, rated.sensor, rated.light)
     except InvalidInput:
-        return Close((), (UNKNOWN,) * len(problem.allowed), np.inf, 0)
+        return Close((), (NOT_VISIBLE,) * len(problem.allowed), np.inf, 0)
     pictures = replace(Pictures.of(picture), closely=True, _known={})
     pictures.once("emitters", lambda: emitters(scene, pictures.lights, nodes))
     evaluated = variance_model("calibrated")(pictures)
     noise = evaluated.variances_object
     if not np.isfinite(noise).all():
-        states = tuple("ok" if np.isfinite(v) else UNKNOWN for v in noise)
+        states = tuple("ok" if np.isfinite(v) else NOT_VISIBLE for v in noise)
         return Close((), states, np.inf, int(noise.argmax()))
     off, clutter = bias(pictures), cluttered(pictures)
     told = forecasts(scene, evaluated, clutter, (off.values, off.values_object))
     given = sources(scene)
     with np.errstate(all="ignore"):
         slopes = sensitivities(Features(pictures), given, biased=False)
-    beside = terms(replace(pictures, closely=False, _known={}), told, noise, biased=True)
+    beside = terms(pictures.glanced, told, noise, biased=True)
     inputs, budgets = shared_inputs(scene, given), []
     for each, slope, rows in zip(told, np.nan_to_num(slopes), beside, strict=True):
         by_name = {source.name: float(c) for source, c in zip(given, slope, strict=True)}

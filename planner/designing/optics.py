@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from imaging.features.locator import kappa2
 from planner.designing.aspects import Aspect
 from planner.designing.wishes import Wishes
+from scenes.cameras.diffraction import airy_um
 from scenes.catalogue import ListedLens, ListedLight, ListedSensor
-from scenes.catalogue.lens import airy_um
-from scenes.catalogue.photometry import WHITE_NM, photons_per_joule
+from scenes.catalogue.photometry import photons_per_joule
 
+_ROUNDED = 1.02  # of an image circle, that a diagonal may be
 LONGEST_S = 1.0  # exposure, where neither camera nor part asks for a shorter one
 MOUNT, CIRCLE, FIELD, DISTANCE, BLUR, TIME, WAY = (
     "mount", "image circle", "field of view", "working distance", "depth of field", "exposure time", "light in the way",
@@ -79,7 +81,7 @@ def focused(sensor: ListedSensor, lens: ListedLens, aspect: Aspect, wishes: Wish
     """Where the camera stands, as near as it can; or what keeps it from it."""
     if not sensor.takes(lens.mount):
         return MOUNT
-    if sensor.diagonal > lens.circle_mm * 1.02:  # formats are named by rounded diagonals
+    if not is_covered(sensor.diagonal, lens.circle_mm):
         return CIRCLE
     half = np.array(sensor.size_mm) / 2
     if lens.is_telecentric:
@@ -107,13 +109,22 @@ def blur_um(
 ) -> float:
     """Standard deviation of the blur on the sensor: diffraction, the lens' own, and defocus at the ends of the depth.
 
-    A point z out of focus is a disc of diameter m^2 z / N, whose standard deviation along a line is a quarter of that.
     A telecentric lens' stated depth of field, where that is wider, is what its maker counts as sharp: it bounds z.
     """
     number = working(lens, stop, at.magnification)
     own = lens.aberrations_um(wavelength_nm, number)
-    defocus = 1000 * at.magnification**2 * aspect.half_depth_mm / number / 4
+    defocus = defocus_um(at.magnification, aspect.half_depth_mm, number)
     return math.hypot(airy_um(wavelength_nm, number), otherwise_um if own is None else own, defocus)
+
+
+def defocus_um(magnification: Any, depth_mm: float, number: Any) -> Any:
+    """Standard deviation along a line of the disc that a point so far out of focus is, m^2 z / N wide; broadcast."""
+    return 1000 * magnification**2 * depth_mm / number / 4
+
+
+def is_covered(diagonal_mm: Any, circle_mm: Any) -> Any:
+    """Whether an image circle covers a sensor: formats are named by rounded diagonals; broadcast."""
+    return diagonal_mm <= _ROUNDED * circle_mm
 
 
 def longest_s(sensor: ListedSensor, at: Focused, wishes: Wishes) -> float:
@@ -180,7 +191,7 @@ def chosen(
         return WAY
     if wishes.rate_hz and sensor.frame_rate_hz and wishes.rate_hz > sensor.frame_rate_hz:
         return TIME
-    longest, found, why = longest_s(sensor, at, wishes), [], BLUR
+    longest, found = longest_s(sensor, at, wishes), []
     for stop in lens.stops:
         number = working(lens, stop, at.magnification)
         rate = electrons_per_s(sensor, lens, number, light, far)
@@ -197,18 +208,10 @@ def chosen(
         worth = kappa2(scale_px, blur_px) * noise_to_signal(sensor, fill)
         found.append((worth, Settings(sensor, lens, light, aspect, at.distance_mm, far, stop, number, at.magnification,
                                       blur_px, time, fill)))  # fmt: skip
-    return min(found, key=lambda each: each[0])[1] if found else why
+    return min(found, key=lambda each: each[0])[1] if found else BLUR
 
 
 def noise_to_signal(sensor: ListedSensor, fill: float) -> float:
     """s_n^2 / C^2 of an edge between a white surface and darkness, its noise the mean of both sides'."""
     signal = fill * sensor.saturation_capacity_e
     return (sensor.temporal_dark_noise_e**2 + signal / 2) / signal**2
-
-
-def least_blur_px(lens: ListedLens, sensor: ListedSensor, at: Focused, aspect: Aspect, otherwise_um: float) -> float:
-    """Least of all apertures, in the shortest light of the catalogue's kind, standing still."""
-    return min(
-        blur_um(lens, stop, at, aspect, min(WHITE_NM, 400.0), otherwise_um) / sensor.pixel_pitch_um
-        for stop in lens.stops
-    )

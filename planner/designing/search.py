@@ -413,7 +413,7 @@ class _Search:
 
     def _told(self, winner: Offer | None, out: dict[str, Counter], complete: bool) -> Design:
         front = self._looked_front()
-        best = winner or min((each for each in front), key=lambda each: each.ratio, default=None)
+        best = winner or min(front, key=lambda each: each.ratio, default=None)
         catalogue = self.catalogue
         self.out |= {name: self.counts[name] for name in _OF_RATING if self.counts[name]}
         searched = Tally(
@@ -432,7 +432,7 @@ class _Search:
             if not open_ones:
                 return front
             self._look(open_ones[-1])
-        return tuple(each for each in _front([offer for offer in self.offers if offer.close is not None]))
+        return tuple(_front([offer for offer in self.offers if offer.close is not None]))
 
 
 def _viewed(problem: Problem, parts: tuple[ListedSensor, ListedLens]) -> tuple[Viewed, ...] | str:

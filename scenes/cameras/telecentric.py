@@ -7,13 +7,13 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from scenes.cameras.diffraction import airy_um
 from scenes.cameras.kinds import CAMERAS
 from scenes.cameras.pinhole import Camera, is_positive
 from scenes.errors import given as told
 from scenes.ranges import NotNegative, Positive
 from scenes.units import Unit, in_unit
 
-_AIRY = 2**0.5 / (2 * math.pi)  # standard deviation of a Gaussian that is nearest to an Airy disc, wavelengths over NA
 _MOST_DEG = 45.0  # of a chief ray: more is no telecentric lens
 Angle = Annotated[float, Field(ge=-_MOST_DEG, le=_MOST_DEG)]
 
@@ -64,11 +64,7 @@ class Telecentric(Camera):
 
     @classmethod
     def derived(cls, camera: dict[str, Any], unit: Unit, pitch_um: float | None) -> dict[str, tuple[float, str]]:
-        """``focal_px`` of magnification and pitch, and the blur by diffraction where a wavelength is said.
-
-        An Airy disc of numerical aperture A on the sensor's side is about a Gaussian of standard deviation
-        sqrt(2) lambda / (2 pi A) (Zhang, Zerubia and Olivo-Marin 2007, two-dimensional, paraxial).
-        """
+        """``focal_px`` of magnification and pitch, and the blur by diffraction where a wavelength is said."""
         magnification, distance = camera.get("magnification"), camera.get("distance")
         for key, value in (("magnification", magnification), ("distance", distance)):
             if not is_positive(value):
@@ -83,7 +79,7 @@ class Telecentric(Camera):
         if is_positive(wavelength):
             if not is_positive(aperture):
                 raise ValueError("camera.numerical_aperture must be given with wavelength_nm, got nothing")
-            blur = _AIRY * wavelength / 1000 * magnification / aperture / pitch_um
+            blur = airy_um(wavelength, magnification / (2 * aperture)) / pitch_um
             found["blur_px"] = (blur, "wavelength_nm")
         return found
 

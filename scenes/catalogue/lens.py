@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from scenes.cameras.diffraction import airy_um
 from scenes.catalogue.entry import Contradiction, Entry, Said
 from scenes.catalogue.photometry import WHITE_NM
 from scenes.model import Name
@@ -192,17 +193,6 @@ class ListedLens(Entry):
                 f" got {self.depth_of_field_mm:g}"
             )
             yield self.against(("depth_of_field_mm", "numerical_aperture"), text)
-
-
-def airy_um(wavelength_nm: float, f_number: float) -> float:
-    """Standard deviation in the image of the Gaussian nearest to an Airy disc, at a working f-number [um].
-
-    sqrt(2) lambda / (2 pi NA) with NA = 1 / (2 N) (Zhang, Zerubia and Olivo-Marin 2007, two-dimensional, paraxial).
-
-    >>> round(airy_um(550, 8), 3)
-    1.981
-    """
-    return math.sqrt(2) / math.pi * wavelength_nm / 1000 * f_number
 
 
 def _last_digit(value: float | None) -> float:
