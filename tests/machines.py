@@ -56,6 +56,11 @@ class Machine:
         }  # fmt: skip
         return os.environ | {name: str(value) for name, value in own.items() if value}
 
+    @property
+    def configuration(self) -> bytes:
+        """Of Embree, as Mitsuba hands it on."""
+        return f"isa={self.embree},threads=%i".encode() if self.embree else _TEXT
+
 
 _NO_512, _NO_AVX = "AVX512-SKX", "AVX,FP16,AVX2,AVX512-SKX"
 _LIBC_512, _LIBC_AVX = "-AVX512F,-AVX512VL,-AVX512BW", "-AVX,-AVX2,-FMA,-AVX512F,-AVX512VL,-AVX512BW"
@@ -63,6 +68,7 @@ OLD = Machine("old", "Prescott", 1, 0, "sse4.2", _NO_AVX, _LIBC_AVX)
 HASWELL = Machine("Haswell", "Haswell", 2, 1, "avx2", _NO_512, _LIBC_512)
 SANDY = Machine("Sandy Bridge", "Sandybridge", 2, 0, "avx", _NO_512 + ",AVX2", _LIBC_512 + ",-AVX2,-FMA")
 THIS = Machine("this, with two threads", "", 2, 99, "", "", "")
+KERNELS = Machine("this, with the old one's matrix products", "Prescott", 1, 99, "", "", "")
 
 
 def dispatched() -> list[str]:
@@ -103,8 +109,7 @@ def passes(machine: Machine, arguments: list[str]) -> int:
     """The exit status of the tests on that machine."""
     with tempfile.TemporaryDirectory() as directory:
         check(machine, Path(directory, "verbose"))
-        told = f"isa={machine.embree},threads=%i".encode() if machine.embree else _TEXT
-        environment = machine.environment(libraries(Path(directory, "mitsuba"), told))
+        environment = machine.environment(libraries(Path(directory, "mitsuba"), machine.configuration))
         command = ["-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", "-p", "no:cacheprovider", *arguments]
         return subprocess.run([sys.executable, *command], env=environment).returncode
 

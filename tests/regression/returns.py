@@ -14,6 +14,7 @@ from typing import Any
 from unittest import mock
 
 from render import variant
+from scenes.model import rebuild
 from tests.regression.digest import Digest, Digester, together
 
 ROOT = Path(__file__).parents[2]
@@ -86,13 +87,14 @@ class Recorder:
 
 @functools.cache
 def _modules() -> tuple[Any, ...]:
-    """All of the product, loaded: what an import calls is no case's."""
+    """All of the product, loaded, its records' checks made: what an import, or a first use, calls is no case's."""
     paths = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
     for path in paths:
         if path.name != "__main__.py":
             name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
+    rebuild()
     ours = (*PACKAGES, "tests")
     return tuple(module for name, module in sorted(sys.modules.items()) if name.split(".")[0] in ours)
 

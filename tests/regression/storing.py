@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.machines import HASWELL, OLD, SANDY, Machine, libraries
+from tests.machines import HASWELL, KERNELS, OLD, SANDY, Machine, libraries
 from tests.regression.digest import Digest
 from tests.regression.kept import STORED, by_case, chosen, kept
 from tests.regression.returns import PACKAGES, ROOT, recorded
@@ -46,6 +46,7 @@ WAYS = (
     Way(machine=OLD),
     Way(("--reversed",), machine=HASWELL),
     Way(machine=SANDY),
+    Way(machine=KERNELS),
     Way(("--again",)),
 )
 
@@ -83,8 +84,7 @@ def _lines(way: Way, cases: list[str], folder: Path) -> list[tuple[str, float, d
     root = _edited(folder / "copy") if way.is_edited else ROOT
     environment = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
     if way.machine is not None:
-        told = f"isa={way.machine.embree},threads=%i".encode()
-        environment = way.machine.environment(libraries(folder / "mitsuba", told))
+        environment = way.machine.environment(libraries(folder / "mitsuba", way.machine.configuration))
     home = {"HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache"), "PYTHONPATH": str(root)}
     one = {"OMP_NUM_THREADS": environment.get("OMP_NUM_THREADS", "1"), "PYTHONHASHSEED": folder.name}
     (folder / "cases").write_text(json.dumps(cases), encoding="utf-8")
