@@ -85,7 +85,7 @@ def window(picture: Picture) -> tuple[slice, slice]:
     corners = np.concatenate([corners, recorded(corners, camera)])
     if np.isnan(corners).any() or scene.floor is not None or backlights(scene):
         return slice(0, camera.height), slice(0, camera.width)
-    margin = 2 + 6 * camera.blur_px + defocus(picture)
+    margin = 2 + 6 * camera.most_blur_px + defocus(picture)
     low, high = np.floor(corners.min(0) - margin), np.ceil(corners.max(0) + margin + 1)
     (left, top), (right, bottom) = (
         np.clip(edge, 0, [camera.width, camera.height]).astype(int).tolist() for edge in (low, high)

@@ -3,7 +3,8 @@
 With k(u) = Phi((u + 1/2) / s) - Phi((u - 1/2) / s) and its integral K, the part of a pixel that a region covers is the
 integral of k(x) k(y) over the region, and by Green's theorem that of K(x) k(y) dy along its boundary. Moving the
 boundary changes it by the integral of k(x) k(y) times the normal displacement: derivatives cost no more than the image.
-Boundaries are taken where they are recorded, so a lens' distortion is exact; defocus changes s from node to node.
+Boundaries are taken where they are recorded, so a lens' distortion is exact; defocus and the lens' field change s from
+node to node.
 """
 
 from __future__ import annotations
@@ -89,7 +90,15 @@ class BlurredModel:
         arrangement = self.arrangement
         ends = arrangement.recorded(arrangement.vertices[arrangement.pieces])
         lengths = np.nan_to_num(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1))
-        return PieceNodes.on(lengths, max(arrangement.blur_px, LEAST_BLUR))
+        start, stop = arrangement.vertices[arrangement.pieces].swapaxes(0, 1)[..., None, :]
+        beside = arrangement.beside_blur(start + np.linspace(0, 1, 9)[:, None] * (stop - start)).min(initial=0.0)
+        return PieceNodes.on(lengths, max(float(np.sqrt(max(arrangement.blur_px**2 + beside, 0.0))), LEAST_BLUR))
+
+    @cached_property
+    def _beside_blur(self) -> np.ndarray:
+        """Variance that the field adds at the nodes, where they are expected, (n,)."""
+        start, stop = self.arrangement.vertices[self.arrangement.pieces[self.nodes.piece]].swapaxes(0, 1)
+        return self.arrangement.beside_blur(start + self.nodes.t[:, None] * (stop - start))
 
     @cached_property
     def _window(self) -> tuple[int, int, int, int]:
@@ -153,7 +162,7 @@ class BlurredModel:
             place = arrangement.recorded(place)
             radii = arrangement.defocus[arrangement.pieces[nodes.piece]]
             radius = radii[:, 0] + nodes.t * (radii[:, 1] - radii[:, 0])
-            blur = np.sqrt(state.blur**2 + radius**2 / 4)
+            blur = np.sqrt(np.maximum(state.blur**2 + self._beside_blur + radius**2 / 4, (LEAST_BLUR / 2) ** 2))
         return Traced(place, tangent, area, blur)
 
     def slots(self, kernels: Kernels) -> np.ndarray:

@@ -6,7 +6,8 @@ import numpy as np
 
 from imaging.features.locator import edge_blur
 from imaging.features.projected_edges import circles
-from imaging.geometry.lens import confusion, lens_jacobian, recorded
+from imaging.geometry.blur import confusion
+from imaging.geometry.lens import lens_jacobian, recorded
 from imaging.geometry.projection import depth, edge_points, project_ideal
 from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, Effect, Influence, changed, largest
@@ -23,7 +24,7 @@ class LensBlur(Effect):
     def influence(self, pictures: Pictures) -> Influence:
         """A point's variance is as (s^2 + s_e^2)^3."""
         scene = pictures.scene
-        own, blur = scene.locator.scale_px**2, edge_blur(scene.camera.blur_px) ** 2
+        own, blur = scene.locator.scale_px**2, edge_blur(scene.camera.most_blur_px) ** 2
         found = sides(pictures)
         moved = np.abs(found.shift(blur)).max(-1)
         return largest((lever(pictures) * moved).sum(-1), np.array([((own + blur) / own) ** 3 - 1]))

@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from scenes.cameras.blur_field import BlurField
 from scenes.cameras.kinds import CAMERAS
 from scenes.cameras.lens import Lens
 from scenes.cameras.lens_model import AnyLens
@@ -39,7 +40,9 @@ class Camera(Model):
     distance: Length
     """From ``look_at`` [length]."""
     blur_px: Annotated[float, Field(ge=0, le=100)] = 0.6
-    """Standard deviation of the lens' Gaussian blur [px]."""
+    """Standard deviation of the lens' Gaussian blur; where ``blur_field`` is given, that in the image's middle [px]."""
+    blur_field: BlurField | None = None
+    """How the blur varies over the image; even where not given."""
     exposure: Level = 200.0
     """What the light adds to darkness on a white diffuse surface at ``look_at`` that faces it [grey levels]."""
     look_at: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
@@ -100,6 +103,11 @@ class Camera(Model):
         if not focal < away:
             raise ValueError(f"camera.focal_length_mm must be less than the distance, {away:g} mm, got {focal:g}")
         return {"focal_px": (focal * away / (away - focal) / pitch_um * 1000, "focal_length_mm")}
+
+    @property
+    def most_blur_px(self) -> float:
+        """The largest standard deviation of the lens' blur within the image, in focus, px."""
+        return self.blur_px if self.blur_field is None else self.blur_px * self.blur_field.most
 
     @property
     def perspective(self) -> float:
