@@ -1,9 +1,10 @@
-"""Blur that varies over the image, as lenses have it: by the image height, as a table, a polynomial or data sheets say."""
+"""Blur that varies over the image, by the image height: as a table, as a polynomial, or as data sheets say it."""
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
+from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
@@ -52,7 +53,7 @@ class BlurField(Model):
         if bool(self.mtf) != (self.lp_per_mm is not None):
             raise ValueError("camera.blur_field.lp_per_mm must be given with mtf, and with it alone, got one of both")
         heights = [row[0] for row in self.table or self.mtf]
-        if any(b <= a for a, b in zip(heights, heights[1:], strict=False)):
+        if any(b <= a for a, b in pairwise(heights)):
             raise ValueError(f"camera.blur_field must be rows of rising image height, got {heights}")
         if self.mtf and heights[0] != 0:
             raise ValueError(f"camera.blur_field.mtf must begin in the middle, at 0, got {heights[0]:g}")

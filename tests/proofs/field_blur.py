@@ -1,4 +1,4 @@
-"""``python -m tests.proofs field-blur``: does what is measured with a lens that blurs its field unevenly scatter as told?
+"""``python -m tests.proofs field-blur``: do measured values scatter as told where blur varies over the field?
 
 A plate with a bore, some 170 px wide, stands at nine places of the field of a lens whose blur grows towards the corners
 (`FIELD`). Each picture is rendered and measured in many noisy images, with the bias taken off that a simulation tells;
@@ -71,7 +71,7 @@ def unaware(picture: Picture) -> Picture:
 def rows(
     picture: Picture, images: int, rng: np.random.Generator, seed: int, locator: str = ""
 ) -> tuple[list[Row], list[Row]]:
-    """All numbers of a picture as they are told with the field, and without it; by the best estimator or a named one."""
+    """All numbers of a picture, told with the field and without it; by the best estimator or a named one."""
     method = Method(locator or measure.best_estimator(picture.scene))
     everywhere = not measure.ESTIMATORS[method.locator].local
     clean = render.image(picture, quality=render.Quality(seed=seed, everywhere=everywhere))
