@@ -67,11 +67,9 @@ class Optics:
 
     def blur_at(self, places: np.ndarray) -> np.ndarray | float:
         """Standard deviation of the lens' blur of what is recorded at places (..., 2), px; one number where even."""
-        return (
-            self.blur_px
-            if self.field is None
-            else self.blur_px * blur_times(self.field, places[..., 0], places[..., 1])
-        )
+        if self.field is None:
+            return self.blur_px
+        return self.blur_px * blur_times(self.field, places[..., 0], places[..., 1])
 
     @property
     def sagitta(self) -> float:
