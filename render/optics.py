@@ -9,6 +9,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from imaging.geometry.blur import blur_in_focus, drift
 from imaging.geometry.lens import undistorted
+from imaging.light.illumination import illumination
 from scenes import Camera
 
 _SOFT = 1.0  # fine pixels: a blur with which an image can be interpolated without ringing
@@ -30,6 +31,9 @@ def blur_and_bin(fine: np.ndarray, camera: Camera, supersample: int, start: tupl
     if camera.lens.bends or np.ndim(blur):
         soft = min(_SOFT, float(np.min(blur)))
         fine = distort(_blurred(fine, soft), camera, start, supersample)
+    if camera.is_dimmed:
+        place = _places(fine.shape, start, supersample)
+        fine = fine * illumination(camera, place[..., 0], place[..., 1])
     fine = spread(fine, blur, soft) if np.ndim(blur) else _blurred(fine, np.sqrt(blur**2 - soft**2))
     height, width = fine.shape[0] // supersample, fine.shape[1] // supersample
     return fine.reshape(height, supersample, width, supersample).mean(axis=(1, 3))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
-from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from scenes.cameras.over_field import Piece, at_height, between, outward
 from scenes.materials.vectors import NUMPY, Ops
 from scenes.model import Model
 from scenes.ranges import Fraction, Positive
@@ -52,13 +51,9 @@ class BlurField(Model):
             )
         if bool(self.mtf) != (self.lp_per_mm is not None):
             raise ValueError("camera.blur_field.lp_per_mm must be given with mtf, and with it alone, got one of both")
-        heights = [row[0] for row in self.table or self.mtf]
-        if any(b <= a for a, b in pairwise(heights)):
-            raise ValueError(f"camera.blur_field must be rows of rising image height, got {heights}")
-        if self.mtf and heights[0] != 0:
-            raise ValueError(f"camera.blur_field.mtf must begin in the middle, at 0, got {heights[0]:g}")
-        if self.table and heights[0] == 0 and self.table[0][1] != 1:
-            raise ValueError(f"camera.blur_field.table must be 1 in the middle, got {self.table[0][1]:g}")
+        if self.mtf and self.mtf[0][0] != 0:
+            raise ValueError(f"camera.blur_field.mtf must begin in the middle, at 0, got {self.mtf[0][0]:g}")
+        outward(f"camera.blur_field.{ways[0]}", self._rows if not self.polynomial else ())
         times = self.times(_LOOKED)
         if not (times.min() >= _LEAST and times.max() <= _MOST):
             raise ValueError(
@@ -69,14 +64,9 @@ class BlurField(Model):
 
     def times(self, height2: Any, ops: Ops = NUMPY) -> Any:
         """The blur over that in the middle at squared image heights; written with ``ops``, as a material's formulas."""
-        total = 1.0 + 0 * height2
-        for start, width, coefficients in _pieces(self.polynomial or None, self._rows):
-            t = ops.minimum(ops.maximum(height2 - start, 0.0), width)
-            rise = 0 * t
-            for each in reversed(coefficients):
-                rise = (rise + each) * t
-            total = total + rise
-        return total
+        if self.polynomial:
+            return at_height((Piece(0.0, 1.0, self.polynomial),), height2, ops)
+        return at_height(between(self._rows), height2, ops)
 
     @property
     def most(self) -> float:
@@ -89,32 +79,11 @@ class BlurField(Model):
 
     @property
     def _rows(self) -> tuple[tuple[float, float], ...]:
-        """Rows [image height, blur over that in the middle], from the middle on; none of a polynomial."""
-        if self.polynomial:
-            return ()
+        """Rows [image height, blur over that in the middle]."""
         if self.mtf:
             middle = math.log(self.mtf[0][1])
             return tuple((height, math.sqrt(math.log(contrast) / middle)) for height, contrast in self.mtf)
-        return self.table if self.table[0][0] == 0 else ((0.0, 1.0), *self.table)
-
-
-@lru_cache(maxsize=64)
-def _pieces(
-    polynomial: tuple[float, ...] | None, rows: tuple[tuple[float, float], ...]
-) -> tuple[tuple[float, float, tuple[float, ...]], ...]:
-    """Where in the squared height a polynomial begins, how far it goes on, and its coefficients from the first on."""
-    if polynomial is not None:
-        return ((0.0, 1.0, polynomial),)
-    if len(rows) < 2:
-        return ()
-    from scipy.interpolate import PchipInterpolator  # slow to load, and rarely needed
-
-    height2 = np.array(rows)[:, 0] ** 2
-    cubic = PchipInterpolator(height2, np.array(rows)[:, 1])
-    return tuple(
-        (float(start), float(width), tuple(map(float, cubic.c[-2::-1, i])))
-        for i, (start, width) in enumerate(zip(height2[:-1], np.diff(height2), strict=True))
-    )
+        return self.table
 
 
 def gaussian_um(contrast: float, lp_per_mm: float) -> float:
