@@ -21,6 +21,7 @@ from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import from_axis, ray_origins, rays
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, has_background, signal
+from imaging.light.illumination import fall
 from imaging.light.revolved import light_around, passes, rings_of
 from imaging.pictures import Pictures
 from scenes import Camera, Curved
@@ -85,6 +86,10 @@ def limb_look(pictures: Pictures, curved: Curved, outline: LimbOutline) -> LimbL
         good &= (contrast > 0) == (near > beyond)
         good &= np.maximum(inside.max(-1), beyond) <= sensor.headroom(scene.noise)
         good &= scene.camera.aperture_radius == 0  # a cone of light touches a round wall in many places
+    if scene.camera.is_dimmed:  # what is seen past the limb changes as the lens' light does
+        falls = (fall(scene.camera, _recorded(outline, scene.camera)) * outward).sum(-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shift = shift + np.where(good, width**2 * beyond * falls / (beyond - near), 0.0)
     squared = np.where(seen, np.where(good, contrast, step) ** 2, 0.0)
     shift = shift + _sampled(pictures, outline)
     return LimbLook(np.where(good, shift, 0.0), squared, noise, good)

@@ -13,6 +13,8 @@ from scenes import Camera
 from scenes.cameras.over_field import at_height, between
 from scenes.materials.vectors import NUMPY, Ops
 
+_STEP = 0.5  # px
+
 
 def illumination(camera: Camera, x: Any, y: Any, ops: Ops = NUMPY) -> Any:
     """At recorded places, px, over that in the image's middle, in the arithmetic of ``ops``."""
@@ -22,6 +24,16 @@ def illumination(camera: Camera, x: Any, y: Any, ops: Ops = NUMPY) -> Any:
         return found
     corner2 = ((camera.width / 2) ** 2 + (camera.height / 2) ** 2) / camera.focal_px**2
     return found / (1 + away2 * corner2) ** 2
+
+
+def fall(camera: Camera, place: np.ndarray) -> np.ndarray:
+    """Gradient of its logarithm at recorded places (..., 2), 1 / px: what part of an even thing's level changes a px."""
+
+    def at(places: np.ndarray) -> np.ndarray:
+        return illumination(camera, places[..., 0], places[..., 1])
+
+    found = [at(place + step) - at(place - step) for step in _STEP * np.eye(2)]
+    return np.stack(found, -1) / (2 * _STEP * at(place))[..., None]
 
 
 def dimming(pictures: Pictures, points: np.ndarray, axes: int) -> np.ndarray | float:

@@ -36,6 +36,8 @@ class Optics:
         Whose lens bends straight edges; straight edges are recorded straight when not given.
     field : Camera, optional
         Whose blur varies over the image; it is ``blur_px`` everywhere when not given.
+    dimmed : bool
+        Whether its light varies over the image, so that an even background is not recorded as even.
     """
 
     shape: tuple[int, int]
@@ -47,6 +49,7 @@ class Optics:
     camera: Camera | None = None
     dark_level: float = 0.0
     field: Camera | None = None
+    dimmed: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> Optics:
@@ -57,7 +60,7 @@ class Optics:
         shape = camera.height, camera.width
         return cls(
             shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level,
-            None if camera.blur_field is None else camera,
+            None if camera.blur_field is None else camera, camera.is_dimmed,
         )  # fmt: skip
 
     @property
