@@ -27,7 +27,7 @@ def illumination(camera: Camera, x: Any, y: Any, ops: Ops = NUMPY) -> Any:
 
 
 def fall(camera: Camera, place: np.ndarray) -> np.ndarray:
-    """Gradient of its logarithm at recorded places (..., 2), 1 / px: what part of an even thing's level changes a px."""
+    """Gradient of its logarithm at recorded places (..., 2), 1 / px: how even things change a px."""
 
     def at(places: np.ndarray) -> np.ndarray:
         return illumination(camera, places[..., 0], places[..., 1])
