@@ -139,7 +139,7 @@ def mean_of(picture: Picture, renders: tuple[np.ndarray, ...]) -> np.ndarray:
         return renders[0]
     camera = picture.scene.camera
     near = near_required(picture, (slice(0, camera.height), slice(0, camera.width)), 1)
-    inner = binary_erosion(near, iterations=math.ceil(4 * camera.blur_px) + 1, border_value=1)
+    inner = binary_erosion(near, iterations=math.ceil(4 * camera.most_blur_px) + 1, border_value=1)
     return np.where(inner, np.mean(renders, 0), renders[0])
 
 

@@ -51,7 +51,7 @@ class Curve:
         It is a sine of the place where the rim runs along their rows or columns.
         """
         there = self.places + (moved / self.gain)[..., None] * self.normals
-        return self.gain * sampled_places(there, self.normals, optics.blur_px, optics.scale_px)
+        return self.gain * sampled_places(there, self.normals, optics.blur_at(self.places), optics.scale_px)
 
 
 @dataclass(frozen=True, eq=False)
