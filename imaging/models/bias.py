@@ -15,6 +15,7 @@ import numpy as np
 from imaging.blurred.boundaries import Boundaries, Places, boundaries_near
 from imaging.blurred.clipped_step import clipped
 from imaging.blurred.segment import Segments, second_and_third
+from imaging.features.demosaiced import line_shift
 from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.features.measurand import Measurands, corner_response, measurands, normals
 from imaging.features.projected_edges import edge_ends
@@ -210,8 +211,12 @@ def _sampled(pictures: Pictures, nodes: EdgeNodes) -> tuple[np.ndarray, np.ndarr
     mean, turn = sampled_line(
         recorded_at(middle, scene.camera), along / size[..., None], length, scene.camera.blur_px, scene.locator.scale_px
     )
+    mixed, mixed_turn = line_shift(
+        scene.noise.colour, recorded_at(middle, scene.camera), along / size[..., None], length, scene.camera.blur_px,
+        scene.locator.scale_px,
+    )  # fmt: skip
     across = np.broadcast_to(nodes.across, nodes.t.shape).mean(-1)
-    return mean * across, turn * across * size / view.lengths
+    return (mean + mixed) * across, (turn + mixed_turn) * across * size / view.lengths
 
 
 def _crossings(pictures: Pictures, nodes: EdgeNodes, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
