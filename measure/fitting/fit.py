@@ -80,6 +80,10 @@ def fit(
             raise InvalidInput(f"free must be some of {', '.join(options)}, got {name!r}")
     if noise not in ("estimated", "given"):
         raise InvalidInput(f"noise must be estimated or given, got {noise!r}")
+    if scene.noise.colour is not None:
+        raise InvalidInput(
+            "noise.colour must be left out to fit a scene, whose pixels count alike, got a colour sensor"
+        )
     known = all(image.tone_known for image in images if isinstance(image, Photograph))
     shots = tuple(grouped([image.levels if isinstance(image, Photograph) else image for image in images]))
     _check_size(scene, shots)
