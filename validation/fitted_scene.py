@@ -44,6 +44,8 @@ def _document(found: Fit, document: dict[str, Any]) -> dict[str, Any]:
     camera = {key: value for key, value in document["camera"].items() if key not in (*_SAID_ELSE, *again)}
     camera |= {key: number_at(scene, f"camera.{key}") for key in (*size, *_CAMERA)}
     camera["look_at"] = list(scene.camera.look_at)
+    if scene.camera.blur_field is not None:  # a transfer would say the blur in the middle once more
+        camera["blur_field"] = scene.camera.blur_field.without_middle()
     lens = scene.camera.lens
     if isinstance(lens, Lens) and lens.bends:
         camera["lens"] = {**camera.get("lens", {}), "distortion": list(lens.coefficients)}

@@ -77,6 +77,16 @@ class BlurField(Model):
         """Standard deviation of the blur in the middle that ``mtf`` says, um on the sensor; None without it."""
         return gaussian_um(self.mtf[0][1], self.lp_per_mm) if self.mtf and self.lp_per_mm else None
 
+    def without_middle(self) -> dict[str, Any]:
+        """The table of a scene's file that says the same but for the blur in the middle; of one row of ``mtf`` none.
+
+        >>> BlurField(mtf=((0.0, 0.5), (1.0, 0.25)), lp_per_mm=60).without_middle()
+        {'table': [[0.0, 1.0], [1.0, 1.4142135623730951]]}
+        """
+        if self.mtf:
+            return {"table": [list(row) for row in self._rows]}
+        return self.model_dump(mode="json", exclude_defaults=True)
+
     @property
     def _rows(self) -> tuple[tuple[float, float], ...]:
         """Rows [image height, blur over that in the middle]."""

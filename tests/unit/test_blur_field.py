@@ -3,6 +3,8 @@
 import json
 import tomllib
 from functools import lru_cache
+from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -31,6 +33,7 @@ from scenes.numbers import with_number
 from scenes.photograph import Photograph
 from tests.commands import ice
 from tests.proofs import field_blur
+from validation import fitted_scene
 
 PRECISE = Ops(mp.sqrt, mp.exp, mp.log, min, max, lambda c, a, b: a if c else b)
 FIELD = {"polynomial": [1.0, 0.5]}
@@ -278,6 +281,19 @@ def test_a_field_is_found_from_slanted_edges(rng):
     assert (found.sd < 0.02 * got).all()
     assert found.p_value > 1e-4
     assert (got[1:] - 1 > 5 * found.sd[1:]).all()  # negative control: an even blur is refused
+
+
+def test_a_fitted_scene_says_its_blur_once(tmp_path):
+    """Of a transfer only how it varies is left, beside the ``blur_px`` that was fitted."""
+    file = tmp_path / "own.toml"
+    told = Path(scenes.find("task1")).read_text().replace("blur_px = 0.6\n", "pixel_pitch_um = 5.0\n")
+    field = "\n[camera.blur_field]\nmtf = [[0.0, 0.5], [1.0, 0.25]]\nlp_per_mm = 60\n"
+    file.write_text(told + field)
+    scene = scenes.load(str(file))
+    fitted = scene.tried(camera=scene.camera.tried(blur_px=0.7))
+    found = fitted_scene.write(SimpleNamespace(scene=fitted, status="ok"), str(file), tmp_path / "fitted.toml")
+    assert found.camera.blur_px == 0.7
+    assert found.camera.most_blur_px == pytest.approx(0.7 * np.sqrt(2))
 
 
 def test_sides_that_do_not_tell_a_field_are_refused():

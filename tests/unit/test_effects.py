@@ -33,7 +33,7 @@ def test_register_has_every_effect_once():
     wanted = (
         "attached_shadow cast_shadow interreflection floor specular_lobe polarisation analyser wavelength fall_off "
         "light_size backlight spill depth_of_field lens_blur lens_distortion shot_noise read_noise fixed_pattern "
-        "quantisation saturation pose_jitter texture"
+        "quantisation saturation pose_jitter texture relative_illumination"
     )
     assert set(EFFECTS) == set(wanted.split())
 

@@ -7,7 +7,7 @@ import numpy as np
 import render
 import scenes
 from imaging import sensor
-from imaging.geometry import lens, projection, visibility
+from imaging.geometry import blur, lens, projection, visibility
 from scenes.changes import changed
 from scenes.materials import torrance_sparrow
 from scenes.parts import facets
@@ -88,7 +88,7 @@ def _seen_from(scene, sensor):
     ideal, depth, eye = found["project_ideal"], found["depth"], projection.sensor_position(camera, sensor)
     found |= {
         "undistorted": lens.undistorted(found["project"], camera), "lens": lens.lens_jacobian(ideal, camera),
-        "confusion": lens.signed_confusion(camera, depth), "blur": lens.blur_at(camera, depth),
+        "confusion": blur.signed_confusion(camera, depth), "blur": blur.blur_at(camera, depth, found["project"]),
         "facing": projection.facing(scene.solid, eye),
     }  # fmt: skip
     for edge in scene.solid.sharp[:8]:
