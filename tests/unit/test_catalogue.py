@@ -186,8 +186,8 @@ def test_the_page_tells_of_every_key() -> None:
 
 
 def test_binning_of_charge_and_of_digital_numbers_makes_the_sensor_that_it_is(rng) -> None:
-    """Sums of 2 x 2 pixels of 3 e-, 0.25 grey levels an electron, drawn: their noise in darkness and in light."""
-    gain, dark, full = 0.25, 3.0, 10400.0
+    """Sums of 2 x 2 pixels of 12 e-, 0.25 grey levels an electron, drawn: their noise in darkness and in light."""
+    gain, dark, full = 0.25, 12.0, 10400.0
     wide = SENSOR | {"temporal_dark_noise_e": dark, "absolute_sensitivity_threshold_e": None, "dynamic_range_db": None}
     kinds = [{"kind": "charge"}, {"kind": "sum"}, {"kind": "mean"}]
     sensor = ListedSensor(**wide, system_gain_e=gain, dsnu_e=1.0, prnu_percent=0.4, binning=kinds)
