@@ -25,12 +25,12 @@ def seen(colour: dict | None, scale_px: float) -> Scene:
     filters = None if colour is None else {"pattern": "RGGB", **colour}
     return scenes.load("task1").with_(
         camera={"blur_px": 1.0}, locator={"scale_px": scale_px, "window_px": 3 * scale_px},
-        noise={"gain": 0.02, "bits": None, "dark_level": 16.0, "colour": filters},
+        noise={"sigma": 0.8, "gain": 0.02, "bits": None, "dark_level": 16.0, "colour": filters},
     )  # fmt: skip
 
 
 def main(scale_px: float = 2.0, supersample: int = 4) -> dict[str, tuple[float, float]]:
-    """Standard deviation over that of the monochrome sensor, as planned and as propagated through a rendered picture."""
+    """Standard deviation over that of the monochrome sensor, planned and propagated through a rendered picture."""
     found, unit = {}, (1.0, 1.0)
     for name, colour in CASES.items():
         scene = seen(colour, scale_px)
