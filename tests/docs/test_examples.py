@@ -59,7 +59,7 @@ def test_height_error(example):
 
 
 def test_colour_sensor(example):
-    """As planned, and through the linear filter; a red lamp is seen by every fourth pixel: sigma x 2 at large scales."""
+    """As planned, and through the linear filter; a red lamp is seen by every fourth pixel: sigma x 2 at most."""
     found = example("colour_sensor").main(supersample=2)
     assert found["monochrome"] == (1.0, 1.0)
     for planned, propagated in found.values():
