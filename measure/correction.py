@@ -294,7 +294,7 @@ def _noise(
         unknown = np.full(values[0].shape[1], np.inf)
         return unknown, unknown
     if images.by_pixel and told.response is not None and told.response_image is not None:
-        blur, responses = picture.scene.camera.blur_px, (told.response, told.response_image)
+        blur, responses = picture.scene.camera.most_blur_px, (told.response, told.response_image)
         first, second = (by_pixels(levels, response, blur) for response in responses)
         for deviations, each in zip((first, second), values, strict=True):
             deviations[found.on_forms] = each.std(0, ddof=1)[found.on_forms]  # no pixel alone moves a form

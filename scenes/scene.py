@@ -465,6 +465,10 @@ class Scene(Model):
                 f"camera.blur_px must be at least {colour.blur_px:.4g}, by which bilinear demosaicing blurs a picture "
                 f"of {colour.reads} itself, got {blur:g}"
             )
+        if colour is not None and colour.interpolates and self.camera.blur_field is not None:
+            raise ValueError(
+                f"camera.blur_field must be left out with noise.colour.demosaicing = {colour.demosaicing}, got one"
+            )
         if colour is not None and self.locator.scale_px < colour.least_scale_px:
             raise ValueError(
                 f"locator.scale_px must be at least {colour.least_scale_px:g} where only {colour.reads} is read, from "

@@ -20,7 +20,8 @@ from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.features.measurand import Measurands, corner_response, measurands, normals
 from imaging.features.projected_edges import edge_ends
 from imaging.features.sampling import sampled_line
-from imaging.geometry.lens import confusion, lens_jacobian
+from imaging.geometry.blur import blur_in_focus, confusion
+from imaging.geometry.lens import lens_jacobian
 from imaging.geometry.lens import recorded as recorded_at
 from imaging.geometry.projection import depth, edge_points
 from imaging.light.appearance import is_plain, side_signals
@@ -208,13 +209,10 @@ def _sampled(pictures: Pictures, nodes: EdgeNodes) -> tuple[np.ndarray, np.ndarr
     along = np.einsum("...ij,...j->...i", lens_jacobian(middle, scene.camera), view.along)
     size = np.linalg.norm(along, axis=-1)
     length = nodes.length[..., 0] * size / view.lengths
-    mean, turn = sampled_line(
-        recorded_at(middle, scene.camera), along / size[..., None], length, scene.camera.blur_px, scene.locator.scale_px
-    )
-    mixed, mixed_turn = line_shift(
-        scene.noise.colour, recorded_at(middle, scene.camera), along / size[..., None], length, scene.camera.blur_px,
-        scene.locator.scale_px,
-    )  # fmt: skip
+    there, scale = recorded_at(middle, scene.camera), scene.locator.scale_px
+    tangent = along / size[..., None]
+    mean, turn = sampled_line(there, tangent, length, blur_in_focus(scene.camera, there), scale)
+    mixed, mixed_turn = line_shift(scene.noise.colour, there, tangent, length, scene.camera.blur_px, scale)
     across = np.broadcast_to(nodes.across, nodes.t.shape).mean(-1)
     return (mean + mixed) * across, (turn + mixed_turn) * across * size / view.lengths
 

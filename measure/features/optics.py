@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imaging.colour import by_raw, raw_variance
+from imaging.geometry.blur import blur_times
 from imaging.geometry.lens import lens_jacobian, recorded, undistorted
 from imaging.sensor import headroom
 from imaging.sensor import recorded as expected
@@ -23,7 +24,8 @@ class Optics:
     shape : tuple of int
         (height, width), px.
     blur_px : float
-        Standard deviation of the lens' blur, px; the pixels' own box comes on top.
+        Standard deviation of the lens' blur, px; the pixels' own box comes on top. Where it varies over the image, that
+        in its middle.
     noise_variance : float
         Variance of a grey level (in darkness, where it depends on the light).
     scale_px, window_px : float
@@ -34,6 +36,10 @@ class Optics:
         Grey level of darkness.
     camera : Camera, optional
         Whose lens bends straight edges; straight edges are recorded straight when not given.
+    field : Camera, optional
+        Whose blur varies over the image; it is ``blur_px`` everywhere when not given.
+    dimmed : bool
+        Whether its light varies over the image, so that an even background is not recorded as even.
     """
 
     shape: tuple[int, int]
@@ -44,6 +50,8 @@ class Optics:
     noise: Noise | None = None
     camera: Camera | None = None
     dark_level: float = 0.0
+    field: Camera | None = None
+    dimmed: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> Optics:
@@ -53,8 +61,20 @@ class Optics:
         bent = camera if camera.lens.bends else None
         shape = camera.height, camera.width
         return cls(
-            shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level
-        )
+            shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level,
+            None if camera.blur_field is None else camera, camera.is_dimmed,
+        )  # fmt: skip
+
+    @property
+    def most_blur_px(self) -> float:
+        """The largest standard deviation of the lens' blur within the image, px."""
+        return self.blur_px if self.field is None else self.blur_px * self.field.blur_field.most
+
+    def blur_at(self, places: np.ndarray) -> np.ndarray | float:
+        """Standard deviation of the lens' blur of what is recorded at places (..., 2), px; one number where even."""
+        if self.field is None:
+            return self.blur_px
+        return self.blur_px * blur_times(self.field, places[..., 0], places[..., 1])
 
     @property
     def sagitta(self) -> float:

@@ -216,7 +216,7 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     design = np.stack([across @ one, across @ two, (across * radial).sum(-1)], -1)
     places, gradient = optics.recorded(ideal), optics.gradient(ideal, normal)
     size = np.linalg.norm(gradient, axis=-1)
-    width = np.hypot(optics.scale_px, edge_blur(optics.blur_px)) * size
+    width = np.hypot(optics.scale_px, edge_blur(optics.blur_at(places))) * size
     inward = -smooth_outline(pictures, circle, ideal - image_centre(scene.camera), normal, width)
     seen = look(pictures, nominal).at(angle) if pictures.lights else None
     if seen is not None:
@@ -272,7 +272,7 @@ def _weights(
         return np.zeros(shown.size), status.NOT_VISIBLE
     if seen is None:
         strong, weight = shown, arc
-        clear = clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.blur_px)
+        clear = clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.most_blur_px)
     else:
         strong = shown & (seen.squared >= MIN_CONTRAST**2 * seen.noise_variance)
         weight, clear = arc * seen.squared / seen.noise_variance, seen.good

@@ -52,10 +52,8 @@ class Curve:
         It is a sine of the place where the rim runs along their rows or columns.
         """
         there = self.places + (moved / self.gain)[..., None] * self.normals
-        by_pixels = sampled_places(there, self.normals, optics.blur_px, optics.scale_px)
-        return self.gain * (
-            by_pixels + place_shifts(optics.colour, there, self.normals, optics.blur_px, optics.scale_px)
-        )
+        mixed = place_shifts(optics.colour, there, self.normals, optics.blur_px, optics.scale_px)
+        return self.gain * (sampled_places(there, self.normals, optics.blur_at(self.places), optics.scale_px) + mixed)
 
 
 @dataclass(frozen=True, eq=False)

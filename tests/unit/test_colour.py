@@ -184,6 +184,13 @@ def test_a_picture_is_no_sharper_than_demosaicing_leaves_it():
         scenes.load("task1").with_(camera={"blur_px": 0.5}, noise={"colour": BILINEAR})
 
 
+def test_a_demosaiced_picture_has_one_blur_all_over():
+    """Shifts by demosaicing are told of one."""
+    field = {"blur_px": 0.8, "blur_field": {"table": [[0, 1], [1, 1.3]]}}
+    with pytest.raises(InvalidInput, match=r"camera.blur_field must be left out with noise.colour.demosaicing = bil"):
+        scenes.load("task1").with_(camera=field, noise={"colour": BILINEAR})
+
+
 def test_one_colour_needs_a_locator_that_smooths_enough():
     with pytest.raises(InvalidInput, match=r"locator.scale_px must be at least 1.5 where only red is read, .*, got 1$"):
         scenes.load("task1").with_(camera={"blur_px": 0.8}, noise={"colour": RED})
