@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from scenes.cameras.data_sheet import derived
+from scenes.cameras.pinhole import shear
 
 if TYPE_CHECKING:
     from scenes.cameras.pinhole import Camera
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 ROOTS = ("camera", "light", "lights", "material", "noise", "floor")
 """Tables of a scene whose numbers may be uncertain."""
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
+_MOVING = ("motion", "line_time_us")
 _TWICE = {"working_distance_mm": "distance"}
 
 
@@ -69,6 +71,10 @@ def with_number(scene: Scene, key: str, value: float) -> Scene:
     changed = _changed(scene, steps_of(key), value)
     if name in scene.camera.sheet or name.startswith("blur_field.mtf") or name == "blur_field.lp_per_mm":
         return changed.tried(camera=_followed(changed))
+    if name.partition("[")[0] in _MOVING:
+        camera = changed.camera
+        told = camera.lens.tried(shear=shear(camera.line_time_us, camera.motion, camera.focal_px / camera.distance))
+        return changed.tried(camera=camera.tried(lens=told))
     if name in _TWICE:
         scale = value / number_at(scene, key)
         return with_number(changed, "camera.distance", scene.camera.distance * scale)

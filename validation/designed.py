@@ -112,7 +112,7 @@ def write(design: Design, source: str, path: Path) -> Scene:
     names = " + ".join(design.best.rated.names)
     told = {
         "title": f"{design.problem.scene.title or design.problem.scene.name}: {names}",
-        "camera": _camera(scene), "noise": scene.noise.model_dump(mode="json", exclude_unset=True),
+        "camera": _camera(scene), "noise": scene.noise.model_dump(mode="json", exclude_unset=True, exclude_none=True),
         "settings": [each.model_dump(mode="json", exclude_none=True) for each in scene.settings],
         "uncertain": [each.model_dump(mode="json", exclude_unset=True, exclude_none=True) for each in scene.uncertain],
     }  # fmt: skip

@@ -14,11 +14,13 @@ from scenes import Scene, Uncertain
 from scenes.numbers import number_at, with_number
 
 Kind = Literal["geometry", "brightness"]
-_GEOMETRY = ("focal_px", "focal_length_mm", "pixel_pitch_um", "distance", "working_distance_mm", "look_at",
-             "lens.distortion", "magnification", "telecentricity_deg", "image_side_deg", "flange_mm")  # fmt: skip
+_GEOMETRY = (
+    "focal_px", "focal_length_mm", "pixel_pitch_um", "distance", "working_distance_mm", "look_at", "lens.distortion",
+    "lens.shear", "motion", "line_time_us", "magnification", "telecentricity_deg", "image_side_deg", "flange_mm",
+)  # fmt: skip
 _UNITS = {
     "focal_px": "px", "focal_length_mm": "mm", "pixel_pitch_um": "um", "working_distance_mm": "mm", "blur_px": "px",
-    "flange_mm": "mm", "wavelength_nm": "nm",
+    "flange_mm": "mm", "wavelength_nm": "nm", "line_time_us": "us", "shear": "px a row",
     "exposure": "levels", "sigma": "levels", "dark_level": "levels", "dsnu": "levels",
 }  # fmt: skip
 _LENGTHS = ("distance", "look_at", "radius", "aperture_radius", "focus", "offset", "height", "half_side")
@@ -89,8 +91,14 @@ def _numbers(scene: Scene) -> Iterator[Source]:
         name = each.key.split("[")[0].split(".", 1)[1]
         kind: Kind = "geometry" if each.key.startswith("camera.") and name in _GEOMETRY else "brightness"
         last = name.rsplit(".", 1)[-1]
-        unit = scene.units if last in _LENGTHS else _UNITS.get(last, "deg" if last.endswith("_deg") else "")
-        scale = 1e-2 if name == "lens.distortion" else abs(value) or 1.0
+        unit = (
+            f"{scene.units}/s"
+            if last == "motion"
+            else scene.units
+            if last in _LENGTHS
+            else _UNITS.get(last, "deg" if last.endswith("_deg") else "")
+        )
+        scale = 1e-2 if name in ("lens.distortion", "lens.shear") else abs(value) or 1.0
         if last == "look_at":
             scale = scene.camera.distance
         yield Source(each.key, value, each, unit, kind, scale, _number_moved(each.key))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imaging.light.appearance import is_plain
 from imaging.light.emitters import emitters
 from imaging.models import variance_model
 from imaging.models.bias import bias, cluttered
@@ -20,9 +21,9 @@ from planner.designing.stations import station
 from planner.forecast import forecasts
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
-from scenes import InvalidInput, Picture
+from scenes import InvalidInput, Picture, Scene
 from scenes.lights import GLANCE, SMOOTH
-from scenes.status import MEASURED, NOT_VISIBLE
+from scenes.status import CLUTTER, MEASURED, NOT_VISIBLE, OK
 
 _NODES = {"dome": SMOOTH}  # each way, that stand for a light
 
@@ -36,7 +37,7 @@ class Close:
     budgets : tuple of Budget
         In the scene's unit, or degrees; () where a quantity cannot be measured.
     statuses : tuple of str
-        Predicted: ``clutter`` is a bias that a render has to tell.
+        Predicted: ``clutter`` is a bias that a render has to tell, as of all where more than one convex body is seen.
     ratio : float
         Largest U over what is allowed; infinite where a quantity cannot be measured.
     worst : int
@@ -84,4 +85,9 @@ def look(problem: Problem, rated: Rated) -> Close:
     worst = int(ratios.argmax())
     ratio = float(ratios[worst]) if measured else np.inf
     alone = float((problem.wishes.coverage * np.sqrt(noise) / problem.allowed).max())
-    return Close(tuple(budgets), tuple(each.status for each in told), ratio, worst, alone)
+    return Close(tuple(budgets), tuple(_known(each.status, scene) for each in told), ratio, worst, alone)
+
+
+def _known(state: str, scene: Scene) -> str:
+    """``clutter`` where a render has to tell the bias: formulas do not know how it moves with light and surfaces."""
+    return state if state != OK or (is_plain(scene) and not scene.textures) else CLUTTER

@@ -47,13 +47,13 @@ def _best(group: list[int], numbers: list[tuple[float, ...]]) -> Iterable[int]:
 
 def of_sensor(part: ListedSensor) -> tuple[Hashable, tuple[float, ...]]:
     """Sensors with the same pixels and mounts, by noise, light and time."""
-    same = part.resolution, part.pixel_pitch_um, part.mount, part.bits, part.shutter
+    same = part.resolution, part.pixel_pitch_um, part.mount, part.bits, part.shutter, part.filters
     longest = -(part.exposure_max_us or _BIG)
     rate = -(part.frame_rate_hz or _BIG)
     pattern = _BIG if part.prnu_percent is None else part.prnu_percent
     gain = part.system_gain_e or 0.0
     return (*same, gain), (
-        -part.saturation_capacity_e, part.temporal_dark_noise_e, -part.quantum_efficiency, longest, rate,
+        -part.saturation_capacity_e, part.temporal_dark_noise_e, -part.best_efficiency, longest, rate,
         part.exposure_min_us or 0.0, pattern, part.dsnu_e or 0.0,
     )  # fmt: skip
 

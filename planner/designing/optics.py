@@ -17,8 +17,9 @@ from scenes.catalogue.photometry import photons_per_joule
 
 _ROUNDED = 1.02  # of an image circle, that a diagonal may be
 LONGEST_S = 1.0  # exposure, where neither camera nor part asks for a shorter one
-MOUNT, CIRCLE, FIELD, DISTANCE, BLUR, TIME, WAY = (
+MOUNT, CIRCLE, FIELD, DISTANCE, BLUR, TIME, WAY, ROLLING = (
     "mount", "image circle", "field of view", "working distance", "depth of field", "exposure time", "light in the way",
+    "rolling shutter",
 )  # fmt: skip
 
 
@@ -148,7 +149,7 @@ def electrons_per_s(sensor: ListedSensor, lens: ListedLens, number: float, light
         return math.nan
     on_sensor = irradiance * (lens.transmission or 1.0) / (4 * number**2)
     area = (sensor.pixel_pitch_um * 1e-6) ** 2
-    return on_sensor * area * photons_per_joule(light.photon_nm) * sensor.quantum_efficiency
+    return on_sensor * area * photons_per_joule(light.photon_nm) * sensor.best_efficiency
 
 
 def light_distance(
@@ -186,6 +187,8 @@ def chosen(
     at = at or focused(sensor, lens, aspect, wishes)
     if isinstance(at, str):
         return at
+    if wishes.speed_mm_s and sensor.shutter == "rolling":  # its rows see a moving part at other times: sheared
+        return ROLLING
     far = light_distance(light, at, aspect, lens.is_telecentric, default_mm)
     if far is None:
         return WAY
@@ -213,5 +216,6 @@ def chosen(
 
 def noise_to_signal(sensor: ListedSensor, fill: float) -> float:
     """s_n^2 / C^2 of an edge between a white surface and darkness, its noise the mean of both sides'."""
-    signal = fill * sensor.saturation_capacity_e
-    return (sensor.temporal_dark_noise_e**2 + signal / 2) / signal**2
+    signal, filters = fill * sensor.saturation_capacity_e, sensor.filters
+    dark, shot = (1.0, 1.0) if filters is None else (filters.noise_factor(2), filters.noise_factor(1))
+    return (dark * sensor.temporal_dark_noise_e**2 + shot * signal / 2) / signal**2

@@ -40,7 +40,7 @@ _SHOWN = 12  # of the front
 _MOST_ASIDE = 16384  # columns or rows, of a scene's camera
 _LOOKS = 24  # close looks for it at most
 _SURE = 0.5  # of a noise that another camera's picture tells
-_OF_RATING = ("visibility", "light in the way", "exposure time", "depth of field", "light")
+_OF_RATING = ("visibility", "light in the way", "exposure time", "depth of field", "light", "rolling shutter")
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,13 +197,19 @@ def usable(catalogue: Catalogue) -> tuple[dict[str, list[Any]], dict[str, Counte
     out: dict[str, Counter] = {}
     for table in ("sensors", "lenses", "lights"):
         kept[table], out[table] = [], Counter()
-        for each in getattr(catalogue, table):
+        for each in _offered(getattr(catalogue, table)):
             why = _unusable(each, wrong, catalogue.priced)
             if why:
                 out[table][why] += 1
             else:
                 kept[table].append(each)
     return kept, out
+
+
+def _offered(entries: tuple[Entry, ...]) -> Iterator[Entry]:
+    """The entries of a table, with every mode of binning of those that can be used."""
+    for each in entries:
+        yield from each.modes if isinstance(each, ListedSensor) and each.binning and not each.missing else (each,)
 
 
 def _unusable(each: Entry, wrong: set[str], priced: bool) -> str:
@@ -217,7 +223,7 @@ def _unusable(each: Entry, wrong: set[str], priced: bool) -> str:
         np.prod(each.resolution) > MOST_PIXELS or max(each.resolution) > _MOST_ASIDE
     ):
         return LARGE
-    return COLOUR if isinstance(each, ListedSensor) and each.colour else ""
+    return COLOUR if isinstance(each, ListedSensor) and each.colour and each.filters is None else ""
 
 
 class _Search:

@@ -82,7 +82,7 @@ def noise_of(sensor: ListedSensor, prnu: float) -> dict[str, Any]:
     return {
         "sigma": gain * sensor.temporal_dark_noise_e, "gain": gain, "bits": min(sensor.bits, _MOST_BITS),
         "dark_level": math.ceil(_CLEAR * gain * sensor.temporal_dark_noise_e) + 1.0,
-        "prnu": prnu if stated is None else stated, "dsnu": gain * (sensor.dsnu_e or 0.0),
+        "prnu": prnu if stated is None else stated, "dsnu": gain * (sensor.dsnu_e or 0.0), "colour": sensor.filters,
     }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from typing import Any
 
@@ -9,8 +10,9 @@ from pydantic import ValidationError
 
 from scenes.cameras.blur_field import BlurField
 from scenes.cameras.kinds import CAMERAS
-from scenes.cameras.pinhole import Camera
+from scenes.cameras.pinhole import Camera, shear
 from scenes.cameras.pinhole import is_positive as _number
+from scenes.model import Model
 from scenes.units import Unit, in_unit
 
 _AGREE = 1e-6  # of a value that is said twice
@@ -51,7 +53,26 @@ def completed(camera: dict[str, Any], unit: Unit) -> dict[str, Any]:
         return camera
     for key, (value, source) in derived(CAMERAS[kind], camera, unit, pitch).items():
         camera = _said(camera, key, value, source)
-    return camera
+    return _sheared(camera)
+
+
+def _sheared(camera: dict[str, Any]) -> dict[str, Any]:
+    """With what a rolling shutter makes of a part that moves, as a part of the lens."""
+    motion, line, lens = camera.get("motion"), camera.get("line_time_us"), camera.get("lens", {})
+    lens = {key: getattr(lens, key) for key in lens.model_fields_set} if isinstance(lens, Model) else lens
+    known = _is_finite(line) and all(map(_number, (camera.get("focal_px"), camera.get("distance"))))
+    if not isinstance(lens, dict):
+        return camera
+    if not known or not isinstance(motion, list | tuple) or len(motion) != 2 or not all(map(_is_finite, motion)):
+        return camera
+    if lens.get("kind", "brown_conrady") != "brown_conrady":
+        return camera
+    told = shear(line, motion, camera["focal_px"] / camera["distance"])
+    return {**camera, "lens": {**lens, "shear": told}}
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def derived(

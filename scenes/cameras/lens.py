@@ -1,4 +1,4 @@
-"""A lens with radial and tangential distortion."""
+"""A lens with radial and tangential distortion, before a sensor that may read its rows one after another."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ def _row(value: Any) -> Any:
 
 
 Coefficient = Annotated[float, Field(ge=-10, le=10)]
+Shear = Annotated[float, Field(ge=-0.5, le=1.0)]
 Distortion = Annotated[
     tuple[Coefficient, Coefficient, Coefficient, Coefficient, Coefficient],
     BeforeValidator(_row, json_schema_input_type=float | list[float]),
@@ -44,6 +45,11 @@ class Lens(LensModel):
     distortion: Distortion = (0.0,) * COEFFICIENTS
     """OpenCV's k1, k2, p1, p2, k3, or k1 alone."""
 
+    shear: tuple[Shear, Shear] = (0.0, 0.0)
+    """By which a place is recorded farther right, and farther down, for each row below the image's middle: what a
+    rolling shutter makes of a part that moves. Follows from ``camera.line_time_us`` and ``camera.motion``
+    [px a row]."""
+
     @property
     def coefficients(self) -> tuple[float, ...]:
         """The five coefficients, also of a copy that was given k1 alone."""
@@ -52,11 +58,11 @@ class Lens(LensModel):
     @property
     def bends(self) -> bool:
         """Whether straight edges are recorded bent."""
-        return any(self.coefficients)
+        return any(self.coefficients) or any(self.shear)
 
     def straight(self) -> Self:
         """The same without distortion."""
-        return self.tried(distortion=(0.0,) * COEFFICIENTS)
+        return self.tried(distortion=(0.0,) * COEFFICIENTS, shear=(0.0, 0.0))
 
     def bent(self, points: np.ndarray) -> np.ndarray:
         """OpenCV's model at points (..., 2) in focal lengths; NaN beyond the radius at which it folds the image."""
@@ -68,6 +74,9 @@ class Lens(LensModel):
             [x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y],
             -1,
         )
+        right, down = self.shear
+        if right or down:
+            moved = moved + moved[..., 1:] * [right, down]
         return np.where((r2 < _fold(k1, k2, k3))[..., None], moved, np.nan)
 
     def slope(self, points: np.ndarray) -> np.ndarray:
@@ -80,7 +89,12 @@ class Lens(LensModel):
         mixed = grows * x * y + 2 * p1 * x + 2 * p2 * y
         xx = radial + grows * x * x + 2 * p1 * y + 6 * p2 * x
         yy = radial + grows * y * y + 6 * p1 * y + 2 * p2 * x
-        return np.stack([np.stack([xx, mixed], -1), np.stack([mixed, yy], -1)], -2)
+        right, down = self.shear
+        rows = (
+            np.stack([xx + right * mixed, mixed + right * yy], -1),
+            np.stack([(1 + down) * mixed, (1 + down) * yy], -1),
+        )
+        return np.stack(rows, -2)
 
 
 @lru_cache(maxsize=16)

@@ -13,9 +13,10 @@ from scenes.cameras.lens import Lens
 from scenes.cameras.lens_model import AnyLens
 from scenes.cameras.over_field import outward
 from scenes.model import Model
-from scenes.ranges import Coordinate, Curve, Fraction, Length, Level, Positive, rising
+from scenes.ranges import Coordinate, Curve, Fraction, Length, Level, NotNegative, Positive, rising
 from scenes.units import Unit, in_unit
 
+_FASTEST, _SAME_SHEAR = 0.5, 1e-9  # px a row
 Illumination = Annotated[tuple[tuple[Fraction, Annotated[float, Field(gt=0, le=1.5)]], ...], Field(max_length=64)]
 MOST_PIXELS = 40_000_000  # 320 MB as float64
 
@@ -65,6 +66,11 @@ class Camera(Model):
     """Of the lens by wavelength, C of eq. 1: rows [nm, relative value]; constant where not given."""
     responsivity: Curve = ()
     """Of the sensor by wavelength, S of eq. 1: rows [nm, relative value]; constant where not given."""
+    line_time_us: NotNegative = 0.0
+    """From reading one row to reading the next, from the top down; 0 of a global shutter [us]."""
+    motion: tuple[Coordinate, Coordinate] = (0.0, 0.0)
+    """With which the part moves along the image's right and down while its rows are read, at ``distance`` [length /
+    s]."""
     pixel_pitch_um: Positive | None = None
     """From one pixel to the next, as on the data sheet [um]."""
     focal_length_mm: Positive | None = None
@@ -79,6 +85,21 @@ class Camera(Model):
         if self.width * self.height > MOST_PIXELS:
             raise ValueError(
                 f"camera.width x height must be at most {MOST_PIXELS} pixels, got {self.width * self.height}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _sheared_as_it_moves(self) -> Camera:
+        sheared = shear(self.line_time_us, self.motion, self.focal_px / self.distance)
+        told = getattr(self.lens, "shear", None)
+        if any(sheared) and told is None:
+            raise ValueError(
+                f"camera.line_time_us must be 0 with a lens of kind {self.lens.kind}, got {self.line_time_us}"
+            )
+        if any(sheared) and max(abs(a - b) for a, b in zip(sheared, told, strict=True)) > _SAME_SHEAR:
+            raise ValueError(
+                f"camera.lens.shear must be {sheared[0]:.9g}, {sheared[1]:.9g}, as line_time_us and motion say, "
+                f"got {told}"
             )
         return self
 
@@ -153,6 +174,30 @@ class Camera(Model):
     @classmethod
     def _in_order(cls, rows: tuple, info: ValidationInfo) -> tuple:
         return rising(f"camera.{info.field_name}", rows)
+
+
+def shear(line_time_us: float, motion: tuple[float, float], px_per_length: float) -> tuple[float, float]:
+    """By how many px a part that moves is recorded farther right and down a row, as a rolling shutter reads it.
+
+    With u its velocity in the image, px a second, and T the line's time, a place y rows below the middle is read
+    y_r T later, y_r = y + u_y T y_r: it is recorded u T y_r farther, of y: u T / (1 - u_y T).
+
+    Raises
+    ------
+    ValueError
+        If it moves down by half a row or more while one is read, or as fast up.
+
+    Examples
+    --------
+    >>> [round(value, 6) for value in shear(10.0, (20.0, 0.0), 50.0)]
+    [0.01, 0.0]
+    """
+    right, down = (1e-6 * line_time_us * px_per_length * speed for speed in motion)
+    if not max(abs(right), abs(down)) < _FASTEST:
+        raise ValueError(
+            f"camera.motion must be less than half a row in line_time_us, got {max(abs(right), abs(down)):.3g}"
+        )
+    return right / (1 - down), down / (1 - down)
 
 
 def is_positive(value: Any) -> bool:

@@ -8,11 +8,15 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from scenes.cameras.colour import Colour
+from scenes.catalogue.binning import Binning
 from scenes.catalogue.entry import Contradiction, Entry, Said
 from scenes.model import Name, Title
 
 Count = Annotated[int, Field(ge=0, le=100_000)]
 Shutter = Literal["global", "rolling", "global reset"]
+Pattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+Ratio = Annotated[float, Field(gt=0, le=1)]
 _ROUNDED_DB = 1.0  # data sheets round to whole decibels
 _ROUNDED_MM, _SIZE = 0.05, 0.01  # of a sensor's side, and a part of it: rows that no picture shows
 _NOISE = 0.10  # part by which the sensitivity threshold may differ from dark noise and half an electron
@@ -33,8 +37,10 @@ class ListedSensor(Entry):
     """Its diagonal [mm]."""
     shutter: Shutter | None = None
     """global, rolling, or global reset."""
-    colour: bool = False
-    """Whether a mosaic of colour filters lies on it."""
+    colour: bool | Pattern = False
+    """Whether a mosaic of colour filters lies on it, or the colours of its first two pixels of two rows: RGGB, ..."""
+    quantum_efficiency_rgb: tuple[Ratio, Ratio, Ratio] | None = None
+    """Of its red, green and blue pixels, each at its own wavelength; makes a colour sensor one to plan with [ratio]."""
     bits: Annotated[int, Field(ge=0, le=24)] | None = None
     """Bit depth of its converter."""
     saturation_capacity_e: Said = None
@@ -65,6 +71,8 @@ class ListedSensor(Entry):
     """Shortest exposure [us]."""
     exposure_max_us: Said = None
     """Longest exposure [us]."""
+    binning: tuple[Binning, ...] = ()
+    """Modes that take pixels together; each is a sensor of its own for a search."""
     emva1288: Title | None = None
     """Result file of EMVA 1288's reference software (XML), relative to the catalogue: fills in what is not given."""
 
@@ -90,6 +98,25 @@ class ListedSensor(Entry):
         """Of that [mm]."""
         return math.hypot(*self.size_mm)
 
+    @property
+    def filters(self) -> Colour | None:
+        """Its colour filters where grey things are measured in its raw mosaic under white light; None without."""
+        if not isinstance(self.colour, str) or self.quantum_efficiency_rgb is None:
+            return None
+        most = max(self.quantum_efficiency_rgb)
+        red, green, blue = (each / most for each in self.quantum_efficiency_rgb)
+        return Colour(pattern=self.colour, response=(red, green, blue))
+
+    @property
+    def best_efficiency(self) -> float:
+        """Quantum efficiency of its strongest pixels [ratio]."""
+        return self.quantum_efficiency if self.filters is None else max(self.quantum_efficiency_rgb)
+
+    @property
+    def modes(self) -> tuple[ListedSensor, ...]:
+        """Itself, and what each mode of binning makes of it."""
+        return (self, *(each.of(self) for each in self.binning))
+
     def takes(self, mount: str) -> bool:
         """Whether a lens of a mount fits; one for C fits a CS camera by a ring of 5 mm, not the other way."""
         return mount in self.mount or (mount == "C" and "CS" in self.mount)
@@ -105,6 +132,13 @@ class ListedSensor(Entry):
             both = f"{self.exposure_min_us:g} and {self.exposure_max_us:g}"
             keys = ("exposure_min_us", "exposure_max_us")
             yield self.against(keys, f"exposure_min_us must be less than exposure_max_us, got {both}")
+        if self.binning and self.colour:
+            yield self.against(
+                ("binning", "colour"), "binning must be of a monochrome sensor, got one with colour filters"
+            )
+        if self.quantum_efficiency_rgb is not None and not isinstance(self.colour, str):
+            text = f"colour must be a pattern (RGGB, ...) with quantum_efficiency_rgb, got {self.colour}"
+            yield self.against(("quantum_efficiency_rgb", "colour"), text)
         if (self.quantum_efficiency or 0) > 1:
             text = f"quantum_efficiency must be a ratio of at most 1, got {self.quantum_efficiency:g}"
             yield self.against(("quantum_efficiency",), text)

@@ -58,9 +58,20 @@ def test_height_error(example):
     assert seen == pytest.approx(11.7047 * 2 / 106.5, rel=0.01)
 
 
+def test_colour_sensor(example):
+    """As planned, and through the linear filter; a red lamp is seen by every fourth pixel: sigma x 2 at most."""
+    found = example("colour_sensor").main(supersample=2)
+    assert found["monochrome"] == (1.0, 1.0)
+    for planned, propagated in found.values():
+        assert planned == pytest.approx(propagated, rel=0.05)
+    assert found["white light, raw mosaic"][0] == pytest.approx(1.31, abs=0.02)
+    assert found["red lamp, red pixels"][1] == pytest.approx(1.73, abs=0.05)
+    assert found["red lamp, raw mosaic"][1] == pytest.approx(4.2, abs=0.1)
+
+
 def test_every_example_is_tested():
     names = {path.stem for path in (ROOT / "examples").glob("*.py")}
-    assert names == {"height_error", "predict_and_plan", "render_and_compare", "uncertainty_budget"}
+    assert names == {"colour_sensor", "height_error", "predict_and_plan", "render_and_compare", "uncertainty_budget"}
 
 
 def test_the_readmes_library_example(capsys):

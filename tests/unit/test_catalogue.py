@@ -183,3 +183,39 @@ def test_the_page_tells_of_every_key() -> None:
         section = page.split(f"## `[[{kind.table}]]`")[1].split("\n## ")[0]
         told = re.findall(r"^\| `(\w+)`\*? \|", section, re.M)
         assert sorted(told) == sorted(kind.model_fields)
+
+
+def test_binning_of_charge_and_of_digital_numbers_makes_the_sensor_that_it_is(rng) -> None:
+    """Sums of 2 x 2 pixels of 12 e-, 0.25 grey levels an electron, drawn: their noise in darkness and in light."""
+    gain, dark, full = 0.25, 12.0, 10400.0
+    wide = SENSOR | {"temporal_dark_noise_e": dark, "absolute_sensitivity_threshold_e": None, "dynamic_range_db": None}
+    kinds = [{"kind": "charge"}, {"kind": "sum"}, {"kind": "mean"}]
+    sensor = ListedSensor(**wide, system_gain_e=gain, dsnu_e=1.0, prnu_percent=0.4, binning=kinds)
+    itself, charge, summed, mean = sensor.modes
+    assert itself is sensor
+    for each in (charge, summed, mean):
+        assert each.resolution == (1224, 1024)
+        assert each.size_mm == pytest.approx(sensor.size_mm)
+        assert each.pixel_pitch_um == 6.9
+        assert (each.dsnu_e, each.prnu_percent) == (2.0, 0.2)
+    assert (charge.temporal_dark_noise_e, charge.saturation_capacity_e, charge.bits) == (dark, full, 12)
+    assert (summed.saturation_capacity_e, summed.bits, summed.system_gain_e) == (4 * full, 14, gain)
+    assert (mean.saturation_capacity_e, mean.bits, mean.system_gain_e) == (4 * full, 12, gain / 4)
+    for mode, made in ((summed, lambda levels: levels.sum(-1)), (mean, lambda levels: np.rint(levels.mean(-1)))):
+        drawn = made(np.rint(100.3 + gain * dark * rng.standard_normal((40_000, 4))))
+        told = (mode.system_gain_e * mode.temporal_dark_noise_e) ** 2 + (1 / 12 if mode is not mean else 0.0)
+        told = told if mode is not mean else told + 1 / 12
+        assert drawn.var() == pytest.approx(told, rel=4 * math.sqrt(2 / 40_000))
+        assert drawn.var() != pytest.approx(1.1 * told, rel=4 * math.sqrt(2 / 40_000))
+
+
+def test_a_colour_sensor_is_planned_with_by_its_efficiencies() -> None:
+    plain = ListedSensor(**SENSOR, colour=True)
+    told = ListedSensor(**SENSOR, colour="RGGB", quantum_efficiency_rgb=(0.3, 0.6, 0.45))
+    assert plain.filters is None
+    assert told.filters.response == (0.5, 1.0, 0.75)
+    assert told.best_efficiency == 0.6
+    wrong = ListedSensor(**SENSOR, colour=True, quantum_efficiency_rgb=(0.3, 0.6, 0.45), binning=[{"kind": "sum"}])
+    texts = [each.text for each in wrong.contradictions()]
+    assert any(re.match(r"colour must be a pattern .* got True", text) for text in texts)
+    assert any(re.match(r"binning must be of a monochrome sensor, got one with colour filters", text) for text in texts)
