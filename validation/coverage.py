@@ -1,4 +1,4 @@
-"""How often does a stated interval hold the true value? Of simulated stations, whose inputs are drawn as the scene says."""
+"""How often does a stated interval hold the true value? Of simulated stations, drawn as the scene says."""
 
 from __future__ import annotations
 
