@@ -49,8 +49,9 @@ class Alarms:
 def drawn(rows: Sequence[JudgedMeasurand], tables: int, seed: int) -> Alarms:
     """Of tables that are drawn as if all that was predicted were true.
 
-    Variances are drawn from their chi-square law, mean errors from the noise of so many pictures, the renderer's noise
-    and what the correction of the bias is not sure of; rows independent of each other.
+    Variances are drawn from their chi-square law, mean errors from the noise of so many pictures and the renderer's;
+    rows independent of each other. What else the correction of a bias is not sure of is how the station's reflectances
+    and lights differ from the scene's, and in rendered pictures they do not.
     """
     some = [each for each in rows if is_trusted(each.status) and each.ratio is not None]
     if not some:
@@ -103,7 +104,7 @@ class _Numbers:
     def draw(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Ratios of variances and mean errors of one table; pictures."""
         freedom = self.counts - 1
-        spread = np.sqrt(self.variance / self.counts + self.noise**2 + self.u_bias**2)
+        spread = np.sqrt(self.variance / self.counts + self.noise**2)
         means = self.predicted_bias + spread * rng.standard_normal(spread.size)
         return rng.chisquare(freedom) / freedom, means, self.counts
 

@@ -205,7 +205,7 @@ def _believed(judge: Judge) -> Iterator[tuple[str, str, Picture]]:
     ):
 
         def stood(step: float, turned: Callable[[float], Pose] = turned) -> Picture:
-            return Picture.of(picture.scene, turned(step), picture.lights)
+            return Picture.of(picture.scene, turned(step), picture.free_lights)
 
         step = _planted(judge, stood, _STEP_DEG, _MOST_DEG)
         if step is not None:

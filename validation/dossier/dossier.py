@@ -11,7 +11,7 @@ from pathlib import Path
 
 import render
 import scenes
-from scenes import InvalidInput, Scene, several
+from scenes import InvalidInput, Scene
 from scenes.status import is_trusted
 from validation import budgets, coverage, hard
 from validation.batch.campaign import Campaign
@@ -112,7 +112,7 @@ class Dossier:
     def at_station(self) -> str:
         """Options for the station's poses."""
         picture = self.station.picture
-        light = " ".join("{:.12g},{:.12g}".format(*pose) for pose in several(picture.lights))
+        light = " ".join("{:.12g},{:.12g}".format(*pose) for pose in picture.free_lights)
         return "--sensor {:.12g},{:.12g}".format(*picture.sensor) + f" --light {shlex.quote(light)}" * bool(light)
 
 

@@ -114,7 +114,9 @@ def _identity(found: Dossier) -> Section:
         "processor give this dossier again, byte by byte; on another processor numbers may differ in their last "
         "digits."
     )
-    versions = Table("Versions", ["what", "version"], [list(each) for each in found.versions.items()], words=True)
+    told = [list(each) for each in found.versions.items()]
+    code = "code: all Python files of the program, in order. Libraries: all that it needs."
+    versions = Table("Versions", ["what", "version"], told, code, words=True)
     where = Table("Processor", ["what", "which"], [list(each) for each in found.processor.items()],
                   "Instruction sets and kernels that are taken decide the last digits.", words=True)  # fmt: skip
     read = [[each.what, each.name, each.sha256 or "not read"] for each in found.files]
@@ -146,7 +148,7 @@ def _agreement(found: Dossier, store: RunFile) -> Section:
     tables += [Table("Settings without a result", ["setting", "why"], refused, words=True)] * bool(refused)
     lost = "; ".join(f"{state} in {count} settings" for state, count in failed.items()) or "none"
     return replace(
-        told, heading="", tables=tables, folded=[],
+        told, answer=f"Are the predicted uncertainties true? {told.answer}", tables=tables, folded=[],
         points=[f"Pictures without a value, by status: {lost}.",
                 "A failed picture is a row of the run with its status; none is left out silently."],
     )  # fmt: skip
@@ -180,10 +182,11 @@ def _controls(found: Dossier) -> Section:
         for each in found.controls
     ]  # fmt: skip
     answer = (
-        f"Of setting {number} the noise-free picture is exposed and measured anew, once as the scene says and then "
-        "with one parameter wrong. The predictions stay those of the scene; the verdict has to contradict them, by "
-        "the test that the parameter concerns. What is planted is as large as so many exposures have to find: seven "
-        "standard errors, for mean errors beyond the 0.3 standard uncertainties of one value that the verdict allows."
+        f"Of setting {number} the noise-free picture is exposed and measured anew, {found.size.exposures} times each: "
+        "first as the scene says, then with one parameter wrong. The predictions stay those of the scene; the verdict "
+        "has to contradict them, by the test that the parameter concerns. What is planted is as large as so many "
+        "exposures have to find: seven standard errors, for mean errors beyond the 0.3 standard uncertainties of one "
+        "value that the verdict allows."
     )
     columns = ["wrong parameter", "planted", "to be found by", "found by", "variance, measured / predicted",
                "largest mean error, u", "as it has to be"]  # fmt: skip
