@@ -46,7 +46,7 @@ class Options:
     renders: Annotated[int, typer.Option(help="Noisy pictures a setting.")] = 1000
     stations: Annotated[int, typer.Option(help="Simulated stations, whose inputs are drawn.")] = 500
     tables: Annotated[int, typer.Option(help="True tables that the verdict is tried on.")] = 2000
-    exposures: Annotated[int, typer.Option(help="Exposures of each negative control.")] = 400
+    exposures: Annotated[int, typer.Option(help="Exposures of each negative control.")] = 300
     seed: Seed = DEFAULT_SEED
     workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.")] = None
     fresh: Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds a run.")] = False

@@ -27,7 +27,7 @@ from validation.remeasured import Method, Sample, batches, remeasured
 from validation.statistics import Verdict
 
 _SURE = 7.0  # four more than the limit of a table of few rows
-_SOFTER_PX = 0.4  # doubles the variance of an edge's place, or nearly
+_SOFTER_PX = 0.4  # by the factor of a variance: more than that variance grows, by any locator
 _SCATTER, _MEAN = ("rows", "pooled"), ("bias",)  # the tests that have to find it
 _CAMERA = ("focal_length_mm", "focal_px", "magnification", "distance", "working_distance_mm")
 _FOLLOWS = {"focal_px": ("focal_length_mm", "magnification"), "distance": ("working_distance_mm",)}  # of a data sheet
@@ -180,7 +180,7 @@ def _spoiled(judge: Judge) -> Iterator[Spoiled]:
     told = f"{1 / factor:.3g} times the light that the scene says"
     yield "camera.exposure", told, dark + (image - dark) / factor, noise
     blur = scene.camera.blur_px
-    softer = blur + _SOFTER_PX
+    softer = blur + _SOFTER_PX * factor
     seen = gaussian_filter(image, math.sqrt(softer**2 - blur**2))
     yield "camera.blur_px", f"{softer:.3g} px, where the scene says {blur:g}", seen, noise
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import measure
 import render
 import scenes
 from scenes import InvalidInput, Scene
@@ -38,7 +39,7 @@ class Size:
     renders: int = 1000
     stations: int = 500
     tables: int = 2000
-    exposures: int = 400
+    exposures: int = 300
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,11 @@ class Dossier:
         return " ".join(["ice", name, shlex.quote(self.source), *more])
 
     @property
+    def estimator(self) -> str:
+        """By which is measured what the budget, the verdict, the controls and the stations tell of."""
+        return self.campaign.scenes[0].locator.estimators[0]
+
+    @property
     def again(self) -> str:
         """What makes the same dossier again."""
         size = self.size
@@ -140,9 +146,9 @@ def make(
         If the scene cannot be read, has no settings, or none of them can be worked on.
     """
     scene = scenes.load(source)
-    options = RunOptions(seed, directory / RUN, workers, fresh)
-    run = run_by(options, scene, size.renders, partial(_told, report, "pictures"))
-    campaign, store = Campaign.of(scene), RunFile.reopen(directory / RUN)
+    options, campaign = RunOptions(seed, directory / RUN, workers, fresh), _measured(scene)
+    run = run_by(options, campaign, size.renders, partial(_told, report, "pictures"))
+    store = RunFile.reopen(directory / RUN)
     try:
         station = _station(campaign, run, store)
         blocks = alarms.in_blocks(run, store)
@@ -157,6 +163,15 @@ def make(
         source, scene, seed, size, inputs.versions(run.variant), inputs.processor(), inputs.files(source, scene), run,
         campaign, station, planted, drawn, blocks, chain, covered, _hard(report),
     )  # fmt: skip
+
+
+def _measured(scene: Scene) -> Campaign:
+    """The scene's settings, measured by what `ice measure` takes for it, of which its budget tells; beside it by what
+    the scene names."""
+    if not scene.settings:
+        raise InvalidInput(f"{scene.name}: settings must be a list of at least one sensor and light, got none")
+    best = measure.best_estimator(scene)
+    return Campaign.of(scene).measured_by(tuple(dict.fromkeys((best, *scene.locator.estimators))))
 
 
 def _told(report: Progress, what: str, _: str, done: int, total: int) -> None:
@@ -200,7 +215,8 @@ def _agreement(found: Dossier) -> Claim:
             f"{verdict.inside} of {verdict.rows} ratios of measured to predicted variance have 1 in their 95 % "
             f"interval; pooled {verdict.pooled.ratio:.3f} [{low:.3f}, {high:.3f}]"
         )
-    command = found.command("validate", f"--renders {found.size.renders} --seed {run.seed}")
+    names = ",".join(found.campaign.scenes[0].locator.estimators)
+    command = found.command("validate", f"--estimators {names} --renders {found.size.renders} --seed {run.seed}")
     return Claim("Predicted scatter and mean errors are those of rendered pictures", says, verdict.agrees, "agreement",
                  command)  # fmt: skip
 

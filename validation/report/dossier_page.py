@@ -66,7 +66,8 @@ def _context(found: Dossier, store: RunFile) -> dict[str, Any]:
     return {
         "name": scene.name, "title": f"Dossier of the measurement software: {part}", "agrees": found.run.verdict.agrees,
         "station": first, "task_station": first | {"simulated": ""}, "task": _numbered("task"),
-        "task_command": found.command("budget", found.at_station), "rule": _RULE,
+        "task_command": found.command("budget", found.at_station),
+        "rule": f"Measured by the estimator {found.estimator}, which `ice measure` takes for this scene. {_RULE}",
         "about": f"What a laboratory shows of ICE {found.versions['ice-vision']} for the scene {scene.name}: evidence "
                  "that the uncertainties it predicts are true, and all that is needed to judge and to repeat it.",
         "sentence": _sentence(found), "holds": found.holds, "claims": claims, "asked_note": _ASKED,
