@@ -47,6 +47,7 @@ class Options:
     stations: Annotated[int, typer.Option(help="Simulated stations, whose inputs are drawn.")] = 500
     tables: Annotated[int, typer.Option(help="True tables that the verdict is tried on.")] = 2000
     exposures: Annotated[int, typer.Option(help="Exposures of each negative control.")] = 300
+    hard: Annotated[bool, typer.Option("--hard/--no-hard", help="Answer the hard cases, too: half a minute.")] = True
     seed: Seed = DEFAULT_SEED
     workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.")] = None
     fresh: Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds a run.")] = False
@@ -70,7 +71,7 @@ def dossier_command(given: Options) -> None:
     check_directory("--out", directory)
     from validation.dossier import Size, make
 
-    size = Size(given.renders, given.stations, given.tables, given.exposures)
+    size = Size(given.renders, given.stations, given.tables, given.exposures, given.hard)
     with continued(False), progress(f"{name}: dossier", unit="done", at_once=True) as report:
         found = make(given.scene, directory, size, given.seed, given.workers, given.fresh, report)
     files = _write(found, directory, time.perf_counter() - started)
@@ -85,7 +86,7 @@ def dossier_command(given: Options) -> None:
 
 def _check(given: Options) -> None:
     check_number("--renders", given.renders, 20, _MOST)
-    check_number("--stations", given.stations, 20, _MOST)
+    check_number("--stations", given.stations, 50, _MOST)
     check_number("--tables", given.tables, 100, _MOST)
     check_number("--exposures", given.exposures, 20, _MOST)
     check_number("--workers", given.workers, 1, MOST_WORKERS)

@@ -22,7 +22,7 @@ def facts(found: Dossier) -> dict[str, Any]:
         **asdict(found.size), "holds": found.holds, "claims": [asdict(each) for each in found.claims],
         "versions": found.versions, "processor": found.processor,
         "inputs": [asdict(each) for each in found.files],
-        "station": {"setting": station.number, "sensor": list(station.picture.sensor),
+        "station": {"setting": station.number, "estimator": found.estimator, "sensor": list(station.picture.sensor),
                     "lights": [list(pose) for pose in station.picture.lights]},
         "budget": None if station.budget is None else budgets.facts(station.budget, [], None, None)["measurands"],
         "run": {key: value for key, value in run.items() if key not in _OF_A_DAY},
