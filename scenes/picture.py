@@ -72,6 +72,11 @@ class Picture:
         return self.lights[0] if self.lights else None
 
     @property
+    def free_lights(self) -> tuple[Pose, ...]:
+        """Poses of the free lights, as `of` takes them; none where it is not known where they stand."""
+        return tuple(self.lights[i] for i in self.scene.free) if self.lights else ()
+
+    @property
     def row(self) -> dict[str, Any]:
         """The scene's name and the poses of sensor and free lights, degrees, as columns of a table.
 
@@ -79,7 +84,7 @@ class Picture:
         >>> Picture.of(scenes.load("task1"), (30, 135)).row["light_polar"] is None
         True
         """
-        free = tuple(self.lights[i] for i in self.scene.free) if self.lights else ((None, None),) * len(self.scene.free)
+        free = self.free_lights or ((None, None),) * len(self.scene.free)
         return {"scene": self.scene.name, **poses(self.sensor, free)}
 
     def _repr_html_(self) -> str:

@@ -20,6 +20,7 @@ from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.zone import joint_parts
 from scenes.results import picked
 from scenes.status import is_trusted
+from validation import coverage
 from validation.chain import Chain
 
 if TYPE_CHECKING:
@@ -88,24 +89,19 @@ def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 
             "interval": list(draws.symmetric), "shortest": list(draws.shortest), "gum": list(each.interval),
             "d_low": told.d_low, "d_high": told.d_high, "tolerance": told.delta, "verdict": told.verdict,
             "reason": told.reason, "stated": list(told.interval), "missed": float(missed[m]),
-            "chain": "closed form, second order in the inputs",
+            "chain": coverage.CLOSED,
         })  # fmt: skip
     return rows
 
 
 def pictured(found: SceneBudget, count: int, seed: int, estimator: str | None = None, report=lambda done: None) -> dict:
     """Pictures of drawn stations, measured: scatter, and how often value +- U holds the true value."""
-    values, states = Chain(found).pictured(np.random.default_rng(seed), count, estimator, report)
-    rows = []
-    for each, column, state in zip(found, values.T, states.T, strict=True):
-        good = column[np.isfinite(column)]
-        held = np.abs(good - each.value) <= each.U
-        rows.append({
-            "name": each.name, "unit": each.unit, "value": float(good.mean()), "u": float(good.std(ddof=1)),
-            "held": float(held.mean()), "n": len(good), "failed": count - len(good),
-            "warned": int((~is_trusted(state)).sum()),
-        })  # fmt: skip
-    return {"stations": count, "chain": "a picture of each draw by the closed form of plain scenes", "measurands": rows}
+    rows = [
+        {"name": each.name, "unit": each.unit, "value": each.mean, "u": each.sigma,
+         **picked(each, "held", "n", "failed", "warned")}
+        for each in coverage.pictured(found, count, seed, estimator, report)
+    ]  # fmt: skip
+    return {"stations": count, "chain": coverage.PICTURES, "measurands": rows}
 
 
 def simulated_gauge(found: SceneBudget, m: int, seed: int, repeats: int = 50) -> dict[str, float] | None:

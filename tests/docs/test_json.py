@@ -15,6 +15,7 @@ from tests.boards import SMALL, poses
 from tests.commands import ice
 from tests.docs.pages import DOCS, keys, told
 from tests.hard.fuzzing.doors import Room
+from tests.rigs import small_rig
 from validation.cli.commands import COMMANDS
 from validation.explore import server
 
@@ -23,7 +24,8 @@ pytestmark = pytest.mark.render
 OPEN = (
     "failures", "parameters", "correlation", "classic_verdicts", "seconds", "paper_real", "global", "guarded",
     "omitted", "quality", "status", "left_out[]", "pairs_left_out",
-    "left_out", "lights[]", "circles[]", "cylinders[]", "surfaces[]",
+    "left_out", "lights[]", "circles[]", "cylinders[]", "surfaces[]", "run", "budget[]", "versions", "processor",
+    "statuses",
 )  # fmt: skip
 POSES = ("--sensor", "30,135", "--light", "15,315")
 ASKED = {  # the least work of each command; by the heading of docs/json.md where that has further words
@@ -47,6 +49,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "msa": ("calibrated_rig",),
     "catalogue": ("check", "parts.toml"),
     "design": ("calibrated_rig", "--catalogue", "parts.toml", "--own-light", "--lens-blur", "2"),
+    "dossier": ("rig.toml", "--renders", "20", "--stations", "50", "--tables", "100", "--exposures", "20", "--no-hard"),
     "cost": ("small.toml", "--budget", "1s", "--out", "cost"),
     "explore": ("small.toml",),
     "hard": ("--area", "reflectance"),
@@ -95,6 +98,7 @@ def folder(tmp_path_factory):
         cv2.imwrite(str(made / f"{i}.png"), np.clip(np.rint(image), 0, 255).astype(np.uint8))
     trimesh.creation.box((30, 20, 10)).export(made / "box.stl")
     (made / "parts.toml").write_text(PARTS)
+    small_rig(made)
     room.run.rename(made / "finished")
     result = json.loads((made / "finished/result.json").read_text())
     result["settings"][0]["empirical"] *= 100

@@ -14,7 +14,7 @@ import scenes
 from planner.budgeting.plans import plan_capability
 from planner.uncertainty.improve import needed, scaled
 from tests.commands import ice
-from tests.proofs.stations import coverage
+from tests.proofs.stations import attained
 from validation import budgets
 from validation.chain import Chain
 from validation.report import budget_table
@@ -66,7 +66,7 @@ def test_the_expansion_is_the_closed_form() -> None:
 
 def test_pictures_of_stations_scatter_as_stated() -> None:
     """60 stations: the interval holds at least 50 of them, which 95 % do in all but 3e-4 of all cases."""
-    found = coverage(scenes.load("calibrated_rig"), 60, 3, "gradient")
+    found = attained(scenes.load("calibrated_rig"), 60, 3, "gradient")
     assert found["lost"] == 0
     assert found["held"] >= 50 / 60  # margin: chance: 49 or fewer of 60 in 3e-4 of all cases
     assert 0.63 < found["scatter_over_u"] < 1.37  # margin: 4 standard errors

@@ -15,7 +15,7 @@ import scenes
 from render.phenomena.base import Influence
 from scenes import Pose
 from tests.commands import ice
-from validation import budgets, effects_check, plan_check, vary_check
+from validation import budgets, coverage, effects_check, plan_check, vary_check
 from validation.cli import measure as measure_cli
 from validation.cli import photograph, plan, verbosity
 from validation.cli import predict as predict_cli
@@ -27,9 +27,10 @@ class Rows:
     """Two budgets, of 10 +- 0.5 and 20 +- 3."""
 
     measurands = (
-        SimpleNamespace(name="slot", unit="mm", value=10.0, U=0.5), SimpleNamespace(name="lean", unit="degrees",
-                                                                                   value=20.0, U=3.0),
-    )  # fmt: skip
+        SimpleNamespace(name="slot", unit="mm", value=10.0, U=0.5, u=0.25, p=0.95),
+        SimpleNamespace(name="lean", unit="degrees", value=20.0, U=3.0, u=1.5, p=0.95),
+    )
+    statuses = ("ok", "ok")
 
     def __iter__(self):
         return iter(self.measurands)
@@ -45,7 +46,7 @@ def test_pictures_of_drawn_stations(monkeypatch):
         asked.append((rng.bit_generator.seed_seq.entropy, count, estimator))
         return values, states
 
-    monkeypatch.setattr(budgets, "Chain", lambda found: SimpleNamespace(pictured=pictured))
+    monkeypatch.setattr(coverage, "Chain", lambda found: SimpleNamespace(pictured=pictured))
     told = budgets.pictured(Rows(), 5, 17, "canny")
     assert asked == [(17, 5, "canny")]
     slot, lean = told["measurands"]

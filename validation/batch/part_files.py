@@ -7,13 +7,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+_DIGITS = 16  # of a digest that a run is known by
+
 
 def contents(campaign: dict[str, Any], directory: Path = Path()) -> dict[str, str]:
     """Digest of each file that a campaign's document names, by its name; of one that cannot be read "".
 
     Names are relative to ``directory``.
     """
-    return {name: _digest(directory / name) for name in dict.fromkeys(_named(campaign))}
+    return {name: whole[:_DIGITS] for name, whole in digests(campaign, directory).items()}
+
+
+def digests(document: dict[str, Any], directory: Path = Path()) -> dict[str, str]:
+    """The same, of any document, as whole SHA-256."""
+    return {name: digest(directory / name) for name in dict.fromkeys(_named(document))}
 
 
 def by_content(identity: dict[str, Any]) -> dict[str, Any]:
@@ -46,9 +53,10 @@ def _content(name: str, digests: dict[str, str]) -> str:
     return f"content {digests.get(name) or 'unknown'} of {Path(name).name}"
 
 
-def _digest(file: Path) -> str:
+def digest(file: Path) -> str:
+    """SHA-256 of a file; of one that cannot be read ""."""
     try:
         with file.open("rb") as opened:
-            return hashlib.file_digest(opened, "sha256").hexdigest()[:16]
+            return hashlib.file_digest(opened, "sha256").hexdigest()
     except OSError:
         return ""

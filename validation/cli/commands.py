@@ -27,6 +27,7 @@ COMMANDS = {
     "catalogue": ("catalogue", "Check a catalogue of sensors, lenses and lights for contradictions."),
     "design": ("design", "Which camera, lens and light to buy for a drawing's tolerances, at the least cost."),
     "msa": ("msa", "Measurement system analysis: %GRR, ndc, Cg, Cgk predicted, and a study beside them."),
+    "dossier": ("dossier", "The validation of this software for one scene, as an assessor reads it."),
     "cost": ("cost", "Measure what each parameter costs and gives on this machine."),
     "explore": ("explore", "A page on which camera and lights are dragged and the prediction answers."),
     "hard": ("hard", "Answers beside references where numbers lose their digits."),

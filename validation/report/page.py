@@ -50,7 +50,8 @@ class Plot:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what is below it: an answer in words, the verdict, plots, points, tables, and tables to unfold."""
+    """A heading and what is below it: an answer in words, the verdict, plots, points, tables, and tables to unfold;
+    ``key`` is what links to it name, ``command`` what shows it."""
 
     heading: str
     answer: str = ""
@@ -59,13 +60,15 @@ class Section:
     points: list[str] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     folded: list[Table] = field(default_factory=list)
+    key: str = ""
+    command: str = ""
 
 
 def write(campaign: Campaign, found: Validation, store: RunFile, station: Station, directory: Path) -> list[Path]:
     """Write report.html and report.md of a run to a directory; their paths."""
     shown = station if len(found.rows) > 1 else replace(station, number=None)
     first = _of_run(first_screen(shown, not store.identity().get("photos")), found, station)
-    sections = [_proof(campaign, found, store), *budget_sections(station.budget)]
+    sections = [proof(campaign, found, store), *budget_sections(station.budget)]
     if len(found.rows) > 1:
         sections.insert(0, _settings(campaign, found, station, bool(first["simulated"])))
     if found.refused:
@@ -227,7 +230,8 @@ def _settings(campaign: Campaign, found: Validation, station: Station, is_simula
     return Section("All settings, the best first", answer, tables=[table])
 
 
-def _proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
+def proof(campaign: Campaign, found: Validation, store: RunFile) -> Section:
+    """Whether the uncertainties of a run are true: measured beside predicted, in figures and tables."""
     lines = proof_figures.lines_of(found, halves_of(campaign))
     forest, bias = proof_figures.forest(lines), proof_figures.bias(lines)
     many = proof_figures.grouped_told(lines)
