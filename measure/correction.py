@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from imaging.colour import seen
 from imaging.features.measurand import measurands
 from imaging.pictures import Pictures
-from imaging.sensor import recorded
 from measure.adjustment import Adjusted, Adjustment, variance
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.propagation import PropagatedValues, propagate
@@ -253,7 +253,7 @@ def _levels(images: Sequence[np.ndarray], picture: Picture) -> np.ndarray:
     """What the sensor records of noise-free images, (n, height, width)."""
     camera = picture.scene.camera
     size = camera.height, camera.width
-    return np.stack([recorded(picture.scene.noise, checked_image(image, size))[0] for image in images])
+    return np.stack([seen(picture.scene.noise, checked_image(image, size)).level for image in images])
 
 
 def _measured(

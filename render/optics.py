@@ -12,12 +12,20 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from imaging.geometry.blur import blur_in_focus, drift
 from imaging.geometry.lens import undistorted
 from imaging.light.illumination import illumination
-from scenes import Camera
+from scenes import Camera, Scene
 
 _SOFT = 1.0  # fine pixels: a blur with which an image can be interpolated without ringing
 _EXACT = 1e-4  # of a step: by which a blur between those that are drawn may be off
 _MOST_DRAWN = 16
 _ROWS, _FAR = 512, 6.0  # fine rows that are blurred at a time; standard deviations beyond which they are not felt
+
+
+def lens_alone(scene: Scene) -> Camera:
+    """The scene's camera with its lens' blur, without what demosaicing adds to that of the picture."""
+    colour, camera = scene.noise.colour, scene.camera
+    if colour is None or not colour.interpolates:
+        return camera
+    return camera.tried(blur_px=math.sqrt(max(camera.blur_px**2 - colour.blur_px**2, 0.0)))
 
 
 def blur_and_bin(fine: np.ndarray, camera: Camera, supersample: int, start: tuple[int, int]) -> np.ndarray:

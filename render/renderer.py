@@ -12,7 +12,7 @@ from imaging.geometry.projection import project_ideal
 from imaging.light.backlight import backlights
 from render import variant as variants
 from render.fine import defocus, fine_image
-from render.optics import blur_and_bin
+from render.optics import blur_and_bin, lens_alone
 from render.parts import parts, within_cone
 from render.phenomena import EFFECTS, EffectTolerance, choose
 from render.phenomena.register import DIMMED
@@ -73,7 +73,7 @@ def image(
             fine = fine_image(part, crop, quality, which)
             if part.silhouette:
                 fine = np.where(within_cone(part.picture, crop, k), fine, 0.0)
-            levels[rows, columns] += blur_and_bin(fine, camera, k, start)
+            levels[rows, columns] += blur_and_bin(fine, lens_alone(picture.scene), k, start)
     for name in sorted(chosen.active):
         levels = EFFECTS[name].seen(levels, picture)
     return levels

@@ -10,6 +10,7 @@ from numpy.polynomial import chebyshev
 
 from imaging import sensor
 from imaging.contours.shading import Profile, fitted
+from imaging.features.demosaiced import place_shifts
 from imaging.features.limb_lent import unlent, unlent_by_faces
 from imaging.features.limb_locator import box_cumulant, limb_crossing
 from imaging.features.limb_outline import LimbOutline, clear_of_ends, framed
@@ -109,7 +110,8 @@ def _sampled(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
     """What sampling by pixels adds, px: much where a wall's line runs along their rows."""
     camera, scale = pictures.scene.camera, pictures.scene.locator.scale_px
     at, outward = _recorded(outline, camera), np.nan_to_num(outline.outward)
-    return sampled_places(at, outward, blur_in_focus(camera, at), scale)
+    mixed = place_shifts(pictures.scene.noise.colour, at, outward, camera.blur_px, scale)
+    return sampled_places(at, outward, blur_in_focus(camera, at), scale) + mixed
 
 
 def _recorded(outline: LimbOutline, camera: Camera) -> np.ndarray:

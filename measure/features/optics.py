@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imaging.colour import by_raw, raw_variance
 from imaging.geometry.blur import blur_times
 from imaging.geometry.lens import lens_jacobian, recorded, undistorted
 from imaging.sensor import headroom
 from imaging.sensor import recorded as expected
 from scenes import Camera, Noise, Scene
+from scenes.cameras.colour import Colour
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class Optics:
     def of(cls, scene: Scene) -> Optics:
         """The scene's camera, noise and locator settings."""
         camera, locator, noise = scene.camera, scene.locator, scene.noise
-        uneven = noise if noise.gain > 0 or noise.bits is not None else None
+        uneven = noise if noise.gain > 0 or noise.bits is not None or noise.colour is not None else None
         bent = camera if camera.lens.bends else None
         shape = camera.height, camera.width
         return cls(
@@ -84,6 +86,11 @@ class Optics:
         return float(np.nan_to_num(np.abs(self.ideal(border) - border), nan=max(self.shape)).max())
 
     @property
+    def colour(self) -> Colour | None:
+        """The sensor's colour filters."""
+        return None if self.noise is None else self.noise.colour
+
+    @property
     def sensor(self) -> Noise:
         """The sensor's noise as a whole."""
         return self.noise or Noise(sigma=float(np.sqrt(self.noise_variance)), dark_level=self.dark_level)
@@ -95,6 +102,39 @@ class Optics:
         if self.noise.gain == 0 and levels.max() <= headroom(self.noise) + self.noise.dark_level:
             return None
         return expected(self.noise, levels).noise_variance
+
+    def independent(
+        self, rows: np.ndarray, pixels: np.ndarray, levels: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray | float]:
+        """Linear functions of pixels as functions of what has independent noise, and the variance of that.
+
+        Where the noise depends on the light each pixel's variance is taken at the level that it shows: what its own
+        noise does to that averages out over the pixels. Of a colour sensor it is raw pixels that are independent; one
+        beside the pixels counts at the level of those that it is a part of.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (..., P)
+            Derivatives by the pixels.
+        pixels : ndarray of int, shape (P,)
+            Flat indices.
+        levels : ndarray, shape (n, P)
+            Grey levels of n images.
+
+        Returns
+        -------
+        rows : ndarray, shape (..., Q)
+        variance : ndarray, shape (n, Q), or float
+            Grey levels^2.
+        """
+        colour = self.colour
+        if colour is None:
+            variance = self.noise_at(levels)
+            return rows, self.noise_variance if variance is None else variance
+        taken, found = by_raw(colour, pixels, self.shape)
+        used = levels @ taken.multiply(1 / taken.sum(0)[None]).tocsr() if colour.interpolates else levels
+        made = (rows.reshape(-1, rows.shape[-1]) @ taken).reshape(*rows.shape[:-1], len(found))
+        return made, raw_variance(self.noise, used, found, self.shape[1])
 
     def has_room(self, places: np.ndarray) -> np.ndarray:
         """Whether a locator that stands at places (m, 2) looks at the image alone, bool (m,)."""

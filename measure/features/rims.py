@@ -181,9 +181,8 @@ def _covariance(used: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.
     smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
     inverse = np.where(tool.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
     rows = np.nan_to_num(fit * inverse[:, None]).reshape(-1, fit.shape[-1]) @ tool.response
-    rows = rows.reshape(len(used), fit.shape[1], -1)
-    variance = tool.optics.noise_at(used)
-    variance = tool.optics.noise_variance if variance is None else variance[:, None]
+    rows, variance = tool.optics.independent(rows.reshape(len(used), fit.shape[1], -1), tool.locator.pixels, used)
+    variance = variance if isinstance(variance, float) else variance[:, None]
     return np.einsum("nip,njp->nij", rows * variance, rows)
 
 
