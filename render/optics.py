@@ -17,6 +17,7 @@ from scenes import Camera, Scene
 _SOFT = 1.0  # fine pixels: a blur with which an image can be interpolated without ringing
 _EXACT = 1e-4  # of a step: by which a blur between those that are drawn may be off
 _MOST_DRAWN = 16
+_ROWS, _FAR = 512, 6.0  # fine rows that are blurred at a time; standard deviations beyond which they are not felt
 
 
 def lens_alone(scene: Scene) -> Camera:
@@ -37,16 +38,40 @@ def blur_and_bin(fine: np.ndarray, camera: Camera, supersample: int, start: tupl
     """
     blur, soft = camera.blur_px * supersample, 0.0
     if camera.blur_field is not None and blur > 0:
-        blur = blur_in_focus(camera, _places(fine.shape, start, supersample)) * supersample
-    if camera.lens.bends or np.ndim(blur):
-        soft = min(_SOFT, float(np.min(blur)))
-        fine = distort(_blurred(fine, soft), camera, start, supersample)
-    if camera.is_dimmed:
-        place = _places(fine.shape, start, supersample)
-        fine = fine * illumination(camera, place[..., 0], place[..., 1])
-    fine = spread(fine, blur, soft) if np.ndim(blur) else _blurred(fine, np.sqrt(blur**2 - soft**2))
+        fine = _unevenly(fine, camera, supersample, start)
+    else:
+        if camera.lens.bends:
+            soft = min(_SOFT, blur)
+            fine = distort(_blurred(fine, soft), camera, start, supersample)
+        fine = _blurred(_dimmed(fine, camera, supersample, start), np.sqrt(blur**2 - soft**2))
     height, width = fine.shape[0] // supersample, fine.shape[1] // supersample
     return fine.reshape(height, supersample, width, supersample).mean(axis=(1, 3))
+
+
+def _unevenly(fine: np.ndarray, camera: Camera, supersample: int, start: tuple[int, int]) -> np.ndarray:
+    """Distorted and blurred by what varies over the field, rows after rows, for a whole image takes much memory."""
+    soft = min(_SOFT, supersample * camera.blur_px * camera.blur_field.least)
+    beyond = math.ceil(_FAR * supersample * camera.most_blur_px) + 2 * supersample
+    if camera.lens.bends:
+        fine = distort(_blurred(fine, soft), camera, start, supersample)
+    found = np.empty(fine.shape)
+    for first in range(0, len(fine), _ROWS):
+        top, stop = max(first - beyond, 0), min(first + _ROWS, len(fine))
+        part, corner = fine[top : stop + beyond], (start[0], start[1] + top)
+        if not camera.lens.bends:
+            part = distort(_blurred(part, soft), camera, corner, supersample)
+        part = _dimmed(part, camera, supersample, corner)
+        blur = blur_in_focus(camera, _places(part.shape, corner, supersample)) * supersample
+        found[first:stop] = spread(part, blur, soft)[first - top : stop - top]
+    return found
+
+
+def _dimmed(fine: np.ndarray, camera: Camera, supersample: int, start: tuple[int, int]) -> np.ndarray:
+    """As the lens passes its light."""
+    if not camera.is_dimmed:
+        return fine
+    place = _places(fine.shape, start, supersample)
+    return fine * illumination(camera, place[..., 0], place[..., 1])
 
 
 def distort(fine: np.ndarray, camera: Camera, start: tuple[int, int], supersample: int) -> np.ndarray:

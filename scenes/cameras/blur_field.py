@@ -73,6 +73,11 @@ class BlurField(Model):
         """The largest `times` within the image."""
         return float(self.times(_LOOKED).max())
 
+    @property
+    def least(self) -> float:
+        """The smallest."""
+        return float(self.times(_LOOKED).min())
+
     def middle_um(self) -> float | None:
         """Standard deviation of the blur in the middle that ``mtf`` says, um on the sensor; None without it."""
         return gaussian_um(self.mtf[0][1], self.lp_per_mm) if self.mtf and self.lp_per_mm else None
