@@ -197,7 +197,7 @@ def usable(catalogue: Catalogue) -> tuple[dict[str, list[Any]], dict[str, Counte
     out: dict[str, Counter] = {}
     for table in ("sensors", "lenses", "lights"):
         kept[table], out[table] = [], Counter()
-        for each in _offered(getattr(catalogue, table)):
+        for each in _offered(getattr(catalogue, table), wrong):
             why = _unusable(each, wrong, catalogue.priced)
             if why:
                 out[table][why] += 1
@@ -206,10 +206,11 @@ def usable(catalogue: Catalogue) -> tuple[dict[str, list[Any]], dict[str, Counte
     return kept, out
 
 
-def _offered(entries: tuple[Entry, ...]) -> Iterator[Entry]:
+def _offered(entries: tuple[Entry, ...], wrong: set[str]) -> Iterator[Entry]:
     """The entries of a table, with every mode of binning of those that can be used."""
     for each in entries:
-        yield from each.modes if isinstance(each, ListedSensor) and each.binning and not each.missing else (each,)
+        some = isinstance(each, ListedSensor) and not each.missing and each.told not in wrong
+        yield from each.modes if some else (each,)
 
 
 def _unusable(each: Entry, wrong: set[str], priced: bool) -> str:

@@ -8,6 +8,7 @@ from tests.proofs.affine_fits import affine_fits
 from tests.proofs.arcs import arcs
 from tests.proofs.bias import bias
 from tests.proofs.boards import boards
+from tests.proofs.colour import colour
 from tests.proofs.conditions import conditions
 from tests.proofs.corpus import corpus
 from tests.proofs.crowded import crowded
@@ -39,6 +40,7 @@ app.command()(affine_fits)
 app.command()(arcs)
 app.command()(bias)
 app.command()(boards)
+app.command()(colour)
 app.command()(conditions)
 app.command()(corpus)
 app.command()(crowded)

@@ -11,9 +11,10 @@ import pytest
 import scenes
 from imaging.geometry.projection import project
 from planner.designing.bounds import NOISE, REASONS, pairs
+from planner.designing.close import look
 from planner.designing.dominance import of_light, of_sensor, undominated
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, limit_ratio, rate, rate_light, views
-from planner.designing.optics import TIME, Focused, blur_um, chosen, focused
+from planner.designing.optics import ROLLING, TIME, Focused, blur_um, chosen, focused
 from planner.designing.search import COLOUR, CONTRADICTORY, INCOMPLETE, LARGE, PRICELESS, design, usable
 from planner.designing.stations import carried, station
 from planner.designing.wishes import Wishes, allowed
@@ -109,6 +110,53 @@ def test_a_part_that_moves_is_exposed_shortly() -> None:
     assert other.fill < one.fill
     dark = light.model_copy(update={"radiance": None})
     assert chosen(camera, lens, dark, fast.aspects[0], fast.wishes, 1.0, 2.0, 300.0) == TIME
+
+
+def test_rolling_shutters_are_for_parts_that_stand() -> None:
+    found = synthetic(2, 1, 30, 1)
+    lens = next(each for each in found.lenses if (each.focal_length_mm or 0.0) >= 16.0)
+    camera = found.sensors[0].model_copy(
+        update={"resolution": (1280, 1024), "pixel_pitch_um": 3.45, "shutter": "rolling"}
+    )
+    light = ListedLight(name="spot", kind="spot", outer_diameter_mm=20.0, radiance=50.0)
+    still, fast = (_problem(name="bracket_mm", speed_mm_s=speed) for speed in (0.0, 500.0))
+    one, other = (chosen(camera, lens, light, each.aspects[0], each.wishes, 1.0, 2.0, 300.0) for each in (still, fast))
+    assert not isinstance(one, str)
+    assert other == ROLLING
+
+
+def test_a_station_of_a_colour_sensor_or_of_a_binned_one_is_that_sensor_s() -> None:
+    """Noise and pixels of the scene that is written; a search offers each mode of binning."""
+    problem, parts = _problem(name="bracket_mm"), synthetic(2, 1, 30, 1)
+    lens = next(each for each in parts.lenses if (each.focal_length_mm or 0.0) >= 16.0)
+    plain = parts.sensors[0].model_copy(
+        update={"resolution": (1280, 1024), "pixel_pitch_um": 3.45, "sensor_size_mm": None, "diagonal_mm": None}
+    )
+    coloured = plain.model_copy(update={"name": "colour", "colour": "GRBG", "quantum_efficiency_rgb": (0.3, 0.6, 0.45)})
+    binned = plain.model_copy(update={"name": "binned", "binning": [{"kind": "charge"}]})
+    kept, out = usable(Catalogue(sensors=(plain, coloured, binned), lenses=(lens,)))
+    assert len(kept["sensors"]) == 4
+    assert not out["sensors"]
+    scene_of = lambda each: station(  # noqa: E731
+        problem.scene, chosen(each, lens, OWN_LIGHT, problem.aspects[0], problem.wishes, 1.0, 2.0, 300.0)
+    )
+    grey, colour, wide = (scene_of(each) for each in (plain, coloured, binned.modes[1]))
+    assert grey.noise.colour is None
+    assert colour.noise.colour.response == (0.5, 1.0, 0.75)
+    assert colour.noise.variance > 1.5 * grey.noise.variance
+    assert (wide.camera.width, wide.camera.height, wide.camera.pixel_pitch_um) == (640, 512, 6.9)
+
+
+def test_what_formulas_do_not_know_of_a_bias_is_not_ok_before_a_render() -> None:
+    """A step's walls are lit from beside: only a render knows what light does beside them."""
+    camera = scenes.catalogue.load("sample").find("sensors", "Allied Vision Alvium 1800 C-240m")
+    lens = scenes.catalogue.load("sample").find("lenses", "FALenses FA5024M12A117")
+    for name, alone in (("calibrated_rig", True), ("bracket_mm", False)):
+        problem = _problem(name=name)
+        seen = views(problem, camera, lens)
+        rated = rate_light(problem, camera, lens, OWN_LIGHT, seen)
+        states = look(problem, rated).statuses
+        assert ("ok" in states) == alone
 
 
 def test_a_calibration_stays_as_good_in_px() -> None:
