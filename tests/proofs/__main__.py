@@ -11,6 +11,7 @@ from tests.proofs.boards import boards
 from tests.proofs.conditions import conditions
 from tests.proofs.corpus import corpus
 from tests.proofs.crowded import crowded
+from tests.proofs.emva import emva
 from tests.proofs.fits import fits
 from tests.proofs.form import form
 from tests.proofs.form_poses import form_poses
@@ -22,6 +23,7 @@ from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.limbs import limbs
 from tests.proofs.mixed import mixed
+from tests.proofs.msa import msa
 from tests.proofs.pairs import pairs
 from tests.proofs.parts import parts
 from tests.proofs.photographs import photographs
@@ -41,6 +43,7 @@ app.command()(boards)
 app.command()(conditions)
 app.command()(corpus)
 app.command()(crowded)
+app.command()(emva)
 app.command()(fits)
 app.command()(form)
 app.command()(form_poses)
@@ -52,6 +55,7 @@ app.command()(large)
 app.command()(lights)
 app.command()(limbs)
 app.command()(mixed)
+app.command()(msa)
 app.command()(pairs)
 app.command()(parts)
 app.command()(photographs)
