@@ -29,6 +29,7 @@ from tests.proofs.parts import parts
 from tests.proofs.photographs import photographs
 from tests.proofs.processed import processed
 from tests.proofs.rate import rate
+from tests.proofs.real_noise import real_noise
 from tests.proofs.stations import stations
 from tests.proofs.telecentric import telecentric
 from tests.proofs.uneven import uneven
@@ -61,6 +62,7 @@ app.command()(parts)
 app.command()(photographs)
 app.command()(processed)
 app.command()(rate)
+app.command()(real_noise)
 app.command()(uneven)
 app.command()(usable)
 app.command()(varied)
