@@ -2,10 +2,10 @@
 
 DIR holds reference sets of EMVA 1288 (github: EMVA1288/datasets; CC BY-SA, so not in this repository): frames of real
 cameras, evenly lit, in pairs of each exposure. Half of the steps tell the camera's noise by photon transfer, as EMVA
-1288 has it. Differences of the other half's pairs over sqrt(2) are real noise of their levels, with all its correlation,
-outliers and patterns that change from frame to frame: put onto a noise-free render, level by level, they take the place
-of the drawn noise. Measured over predicted variance tells whether the model is true. Without DIR nothing is done, and
-the exit status is 0.
+1288 has it. Differences of the other half's pairs over sqrt(2) are real noise of their levels, with all its
+correlation, outliers and patterns that change from frame to frame: put onto a noise-free render, level by level, they
+take the place of the drawn noise. Measured over predicted variance tells whether the model is true. Without DIR
+nothing is done, and the exit status is 0.
 """
 
 from __future__ import annotations
