@@ -12,6 +12,7 @@ from tests.proofs.colour import colour
 from tests.proofs.conditions import conditions
 from tests.proofs.corpus import corpus
 from tests.proofs.crowded import crowded
+from tests.proofs.emva import emva
 from tests.proofs.field_blur import field_blur
 from tests.proofs.fits import fits
 from tests.proofs.form import form
@@ -24,11 +25,13 @@ from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.limbs import limbs
 from tests.proofs.mixed import mixed
+from tests.proofs.msa import msa
 from tests.proofs.pairs import pairs
 from tests.proofs.parts import parts
 from tests.proofs.photographs import photographs
 from tests.proofs.processed import processed
 from tests.proofs.rate import rate
+from tests.proofs.real_noise import real_noise
 from tests.proofs.stations import stations
 from tests.proofs.telecentric import telecentric
 from tests.proofs.uneven import uneven
@@ -45,6 +48,7 @@ app.command()(conditions)
 app.command()(corpus)
 app.command()(crowded)
 app.command()(field_blur)
+app.command()(emva)
 app.command()(fits)
 app.command()(form)
 app.command()(form_poses)
@@ -56,11 +60,13 @@ app.command()(large)
 app.command()(lights)
 app.command()(limbs)
 app.command()(mixed)
+app.command()(msa)
 app.command()(pairs)
 app.command()(parts)
 app.command()(photographs)
 app.command()(processed)
 app.command()(rate)
+app.command()(real_noise)
 app.command()(uneven)
 app.command()(usable)
 app.command()(varied)

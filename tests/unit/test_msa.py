@@ -7,6 +7,7 @@ import scenes
 from planner.budgeting.budgets import budget
 from planner.uncertainty.msa import COMPONENTS, Components, Study, cheapest_guard, check, too_large
 from planner.uncertainty.risks import Limits, global_risks
+from tests.proofs.msa import GUARDS, guard
 from validation import msa
 
 # The example of the AIAG manual (Measurement Systems Analysis, 4th edition): three appraisers, ten parts, three trials.
@@ -105,6 +106,13 @@ def test_the_cheapest_guard_band_is_the_least_of_a_scan():
         costs.append(20 * risks.wrong_acceptance + risks.wrong_rejection)
     assert found.cost <= min(costs) * (1 + 1e-9)
     assert abs(found.width - widths[np.argmin(costs)]) < 0.01  # margin: the scan's step
+
+
+@pytest.mark.parametrize("asked", GUARDS)
+def test_the_cheapest_guard_band_costs_as_told_and_least_of_drawn_parts(asked):
+    found = guard(200_000, 6, *asked)
+    assert abs(found["told"] - found["drawn"]) < 4 * found["error"]  # margin: 4 standard errors
+    assert found["more"] > 2  # half of u wider or narrower costs more, beyond chance
 
 
 # --- a station
