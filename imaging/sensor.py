@@ -24,7 +24,7 @@ class Levels(NamedTuple):
 
 def shot_noise(noise: Noise, signal: np.ndarray) -> np.ndarray:
     """Variance that the light's own noise adds at grey levels above darkness: gain x signal."""
-    return noise.gain * np.maximum(signal, 0.0)
+    return noise.shot_gain * np.maximum(signal, 0.0)
 
 
 def recorded(noise: Noise, level: np.ndarray) -> Levels:
@@ -68,7 +68,7 @@ def sensitivity(noise: Noise, level: np.ndarray) -> np.ndarray:
     level = np.asarray(level, float)
     sigma = np.sqrt(np.maximum(noise.variance + shot_noise(noise, level - noise.dark_level), 1e-300))
     below = (full_scale(noise) - level) / sigma
-    grows = np.where(level > noise.dark_level, noise.gain, 0.0) / (2 * sigma)
+    grows = np.where(level > noise.dark_level, noise.shot_gain, 0.0) / (2 * sigma)
     return ndtr(below) - np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi) * grows
 
 
@@ -126,5 +126,5 @@ def headroom(noise: Noise) -> float:
     room = full_scale(noise) - noise.dark_level
     if not np.isfinite(room):
         return np.inf
-    half = _MARGIN**2 * noise.gain / 2
+    half = _MARGIN**2 * noise.shot_gain / 2
     return float(room + half - np.sqrt(half * (half + 2 * room) + _MARGIN**2 * noise.variance))

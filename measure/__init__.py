@@ -18,6 +18,7 @@ from measure.fitting.fit import fit
 from measure.fitting.result import Fit
 from measure.measurands import Measurements, corrected, measure, measure_by
 from measure.measurement import Measurement, distance, distances
+from measure.photo.blur_field import BlurredSides, FittedField, blurred_sides, fitted_field
 from measure.photo.lens import Intrinsics, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
@@ -28,6 +29,7 @@ from measure.region import region_of_interest
 
 __all__ = [
     "ESTIMATORS",
+    "BlurredSides",
     "Board",
     "CameraCalibration",
     "Candidate",
@@ -36,6 +38,7 @@ __all__ = [
     "Ellipse",
     "EstimatorKind",
     "Fit",
+    "FittedField",
     "Images",
     "Intrinsics",
     "MeasuredShape",
@@ -48,6 +51,7 @@ __all__ = [
     "Quadrilateral",
     "Shapes",
     "best_estimator",
+    "blurred_sides",
     "bound",
     "calibrate_camera",
     "chessboard",
@@ -59,6 +63,7 @@ __all__ = [
     "find_ellipse",
     "fit",
     "fit_ellipse",
+    "fitted_field",
     "load_lens",
     "measure",
     "measure_by",

@@ -87,7 +87,7 @@ class Adjustment:
         level, variance = recorded(noise, clean)
         deviation = np.sqrt(np.broadcast_to(variance, clean.shape))
         steep = gaussian_gradient_magnitude(clean, 1.0) > _STEEP * deviation
-        near = math.ceil(3 * picture.scene.camera.blur_px) + 1
+        near = math.ceil(3 * picture.scene.camera.most_blur_px) + 1
         lost = binary_dilation(steep, iterations=near) | (level > full_scale(noise) - _NEAR_END * deviation)
         regions = _regions(_means(lost[None], side)[0] == 0)
         at = np.argwhere(regions)

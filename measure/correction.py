@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from imaging.colour import seen
 from imaging.features.measurand import measurands
 from imaging.pictures import Pictures
-from imaging.sensor import recorded
 from measure.adjustment import Adjusted, Adjustment, variance
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.propagation import PropagatedValues, propagate
@@ -253,7 +253,7 @@ def _levels(images: Sequence[np.ndarray], picture: Picture) -> np.ndarray:
     """What the sensor records of noise-free images, (n, height, width)."""
     camera = picture.scene.camera
     size = camera.height, camera.width
-    return np.stack([recorded(picture.scene.noise, checked_image(image, size))[0] for image in images])
+    return np.stack([seen(picture.scene.noise, checked_image(image, size)).level for image in images])
 
 
 def _measured(
@@ -294,7 +294,7 @@ def _noise(
         unknown = np.full(values[0].shape[1], np.inf)
         return unknown, unknown
     if images.by_pixel and told.response is not None and told.response_image is not None:
-        blur, responses = picture.scene.camera.blur_px, (told.response, told.response_image)
+        blur, responses = picture.scene.camera.most_blur_px, (told.response, told.response_image)
         first, second = (by_pixels(levels, response, blur) for response in responses)
         for deviations, each in zip((first, second), values, strict=True):
             deviations[found.on_forms] = each.std(0, ddof=1)[found.on_forms]  # no pixel alone moves a form

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from imaging.colour import rows_by_raw, seen
 from imaging.models.bias import MOST
 from imaging.models.extremes import with_extremes
-from imaging.sensor import recorded
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.kinds import ESTIMATORS
 from measure.estimators.separate import SeparateEstimator
@@ -109,7 +109,8 @@ def propagate(
     beside which another edge runs for a part, drawn noise is asked whether it is, and what needs one that is not has no
     value: ``ill_conditioned``. With g the derivative of a
     value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
-    share pixels, and so their correlation is in g.
+    share pixels, and so their correlation is in g. Of a colour sensor g is taken by the raw pixels, which are
+    independent.
 
     Parameters
     ----------
@@ -124,7 +125,8 @@ def propagate(
     check_method(estimator, threshold)
     picture = Picture.of(scene, sensor, light)
     camera = picture.scene.camera
-    clean, noise = recorded(picture.scene.noise, checked_image(one_picture(clean), (camera.height, camera.width)))
+    sensor_noise = picture.scene.noise
+    clean, noise = seen(sensor_noise, checked_image(one_picture(clean), (camera.height, camera.width)))
     noise = np.broadcast_to(noise, clean.shape).ravel()
     found = find(clean[None], picture, estimator, threshold, noiseless=True)
     rows, lost = _responses(clean, picture, found, estimator, threshold)
@@ -132,7 +134,8 @@ def propagate(
     for m, gone in enumerate(((found.image.gradient[0] != 0) & lost).any(-1)):
         if gone and state[m] in status.MEASURED:  # noise decides which of two edges is found, or a wrong one was
             state[m] = status.ILL_CONDITIONED
-    errors = (rows.multiply(noise).tocsr() @ rows.T).toarray()
+    by_raw = rows_by_raw(sensor_noise, rows, clean.shape)
+    errors = (by_raw.multiply(noise).tocsr() @ by_raw.T).toarray()
     errors[np.diag_indices(len(errors))] += _of_forms(found)
     gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
     image, plane = (

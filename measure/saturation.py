@@ -86,7 +86,8 @@ def expected(noise: Noise, levels: np.ndarray) -> float:
     1.5
     """
     signal = levels - noise.dark_level
-    variance = noise.sigma**2 + shot_noise(noise, signal) + noise.dsnu**2 + (noise.prnu * signal) ** 2
+    dark = noise.factor(2) * (noise.sigma**2 + noise.dsnu**2)
+    variance = dark + shot_noise(noise, signal) + (noise.prnu * signal) ** 2
     return float(ndtr((levels - _end(noise)) / np.sqrt(np.maximum(variance, 1e-12))).sum())
 
 

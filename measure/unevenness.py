@@ -16,7 +16,8 @@ import numpy as np
 from scipy import sparse
 from scipy.ndimage import gaussian_filter
 
-from imaging.geometry.lens import blur_at, undistorted
+from imaging.geometry.blur import blur_at
+from imaging.geometry.lens import undistorted
 from imaging.geometry.looked_at import looked_at
 from imaging.geometry.projection import depth
 from imaging.geometry.rays import reaches
@@ -61,7 +62,7 @@ class Unevenness:
     def about(cls, picture: Picture, response: sparse.csr_array) -> Unevenness:
         """About the pixels by which values have derivatives, (M, height * width)."""
         camera = picture.scene.camera
-        reach = math.ceil(2 * _REACH * camera.blur_px) + 1
+        reach = math.ceil(2 * _REACH * camera.most_blur_px) + 1
         used = np.divmod(np.unique(response.indices), camera.width)
         sizes = camera.height, camera.width
         window = (
@@ -112,12 +113,14 @@ class Unevenness:
         camera, pictures = self.picture.scene.camera, Pictures.of(self.picture)
         rows, columns = ((np.arange(self._fine * n) + 0.5) / self._fine - 0.5 for n in self._shape)
         x, y = np.meshgrid(columns + self.window[1].start, rows + self.window[0].start)
-        seen, points = looked_at(self.picture, undistorted(np.stack([x.ravel(), y.ravel()], -1), camera))
+        seen_at = np.stack([x.ravel(), y.ravel()], -1)
+        seen, points = looked_at(self.picture, undistorted(seen_at, camera))
         found = []
         for face, sheet in fields.items():
             places = np.flatnonzero(seen == face)
             if places.size:
-                blur = float(np.mean(blur_at(camera, depth(points[places], pictures.sensors, camera))))
+                away = depth(points[places], pictures.sensors, camera)
+                blur = float(np.mean(blur_at(camera, away, seen_at[places])))
                 found.append(_Face(sheet, places, points[places], _signal(pictures, points[places], face), blur))
         return tuple(found)
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from imaging.geometry.lens import confusion
+from imaging.geometry.blur import confusion
 from imaging.geometry.projection import depth
 from imaging.light.appearance import is_plain
 from render import variant as variants

@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.interpolate import BarycentricInterpolator
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from imaging.geometry.blur import blur_in_focus, drift
 from imaging.geometry.lens import undistorted
-from scenes import Camera
+from imaging.light.illumination import illumination
+from scenes import Camera, Scene
 
 _SOFT = 1.0  # fine pixels: a blur with which an image can be interpolated without ringing
+_EXACT = 1e-4  # of a step: by which a blur between those that are drawn may be off
+_MOST_DRAWN = 16
+
+
+def lens_alone(scene: Scene) -> Camera:
+    """The scene's camera with its lens' blur, without what demosaicing adds to that of the picture."""
+    colour, camera = scene.noise.colour, scene.camera
+    if colour is None or not colour.interpolates:
+        return camera
+    return camera.tried(blur_px=math.sqrt(max(camera.blur_px**2 - colour.blur_px**2, 0.0)))
 
 
 def blur_and_bin(fine: np.ndarray, camera: Camera, supersample: int, start: tuple[int, int]) -> np.ndarray:
@@ -20,10 +36,15 @@ def blur_and_bin(fine: np.ndarray, camera: Camera, supersample: int, start: tupl
     interpolates, the rest behind it.
     """
     blur, soft = camera.blur_px * supersample, 0.0
-    if camera.lens.bends:
-        soft = min(_SOFT, blur)
+    if camera.blur_field is not None and blur > 0:
+        blur = blur_in_focus(camera, _places(fine.shape, start, supersample)) * supersample
+    if camera.lens.bends or np.ndim(blur):
+        soft = min(_SOFT, float(np.min(blur)))
         fine = distort(_blurred(fine, soft), camera, start, supersample)
-    fine = _blurred(fine, np.sqrt(blur**2 - soft**2))
+    if camera.is_dimmed:
+        place = _places(fine.shape, start, supersample)
+        fine = fine * illumination(camera, place[..., 0], place[..., 1])
+    fine = spread(fine, blur, soft) if np.ndim(blur) else _blurred(fine, np.sqrt(blur**2 - soft**2))
     height, width = fine.shape[0] // supersample, fine.shape[1] // supersample
     return fine.reshape(height, supersample, width, supersample).mean(axis=(1, 3))
 
@@ -31,15 +52,57 @@ def blur_and_bin(fine: np.ndarray, camera: Camera, supersample: int, start: tupl
 def distort(fine: np.ndarray, camera: Camera, start: tuple[int, int], supersample: int) -> np.ndarray:
     """The fine image as the lens records it: each fine pixel takes its value from where a pinhole camera has it.
 
-    0 where the lens records nothing.
+    That is of what will appear where blur that varies moves it to (`imaging.geometry.blur`). 0 where the lens records
+    nothing.
     """
-    y, x = np.mgrid[: fine.shape[0], : fine.shape[1]]
-    seen = (np.stack([x, y], -1) + np.array(start) + 0.5) / supersample - 0.5
-    source = undistorted(seen, camera)
+    seen = _places(fine.shape, start, supersample)
+    source = undistorted(seen - drift(camera, seen), camera)
     lost = ~np.isfinite(source).all(-1)
     at = np.where(lost[..., None], 0.0, (source + 0.5) * supersample - 0.5 - np.array(start))
     order = 3 if camera.blur_px > 0 else 1
     return np.where(lost, 0.0, map_coordinates(fine, [at[..., 1], at[..., 0]], order=order, mode="nearest"))
+
+
+def spread(fine: np.ndarray, blur: np.ndarray, soft: float) -> np.ndarray:
+    """Each fine pixel's light spread by a Gaussian of its own, ``blur`` (standard deviations in fine pixels, of the
+    image's shape), in an image that is blurred by ``soft`` already.
+
+    An image blurred by a variance is a smooth function of that one's logarithm: a polynomial through some blurs of the
+    range, Chebyshev's, tells those between. Light is spread by each in the part in which its polynomial takes it.
+    """
+    place = 2 * np.log(blur)
+    low, high = float(place.min()), float(place.max())
+    nodes = (low + high) / 2 + (high - low) / 2 * chebyshev.chebpts1(drawn(low, high))
+    found = np.zeros(fine.shape)
+    for each, node in enumerate(nodes):
+        share = np.ones(fine.shape)
+        for other in np.delete(nodes, each):
+            share *= (place - other) / (node - other)
+        found += _blurred(share * fine, np.sqrt(max(np.exp(node) - soft**2, 0.0)))
+    return found
+
+
+def drawn(low: float, high: float) -> int:
+    """How many blurs tell all between: the least number with which no amplitude of any wave is more than `_EXACT` off.
+
+    ``low`` and ``high`` are the logarithms of the variances.
+    """
+    if high - low < 1e-12:
+        return 1
+    at = np.linspace(low, high, 65)
+    waves = np.exp(np.linspace(-12, 3, 121)[:, None] - low)  # half the squared frequency
+    for count in range(2, _MOST_DRAWN):
+        nodes = (low + high) / 2 + (high - low) / 2 * chebyshev.chebpts1(count)
+        told = BarycentricInterpolator(nodes, np.exp(-waves * np.exp(nodes)).T)(at)
+        if np.abs(told.T - np.exp(-waves * np.exp(at))).max() <= _EXACT:
+            return count
+    return _MOST_DRAWN
+
+
+def _places(shape: tuple[int, ...], start: tuple[int, int], supersample: int) -> np.ndarray:
+    """The middles of fine pixels, recorded px, (height, width, 2)."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    return (np.stack([x, y], -1) + np.array(start) + 0.5) / supersample - 0.5
 
 
 def _blurred(fine: np.ndarray, sigma: float) -> np.ndarray:

@@ -12,9 +12,10 @@ from imaging.geometry.projection import project_ideal
 from imaging.light.backlight import backlights
 from render import variant as variants
 from render.fine import defocus, fine_image
-from render.optics import blur_and_bin
+from render.optics import blur_and_bin, lens_alone
 from render.parts import parts, within_cone
 from render.phenomena import EFFECTS, EffectTolerance, choose
+from render.phenomena.register import DIMMED
 from render.precision import check_precision
 from render.quality import Quality
 from scenes import InvalidInput, Picture, Scene
@@ -68,11 +69,11 @@ def image(
         check_precision(camera)
         crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
         which, start = variant or variants.choose(), (crop[1].start, crop[0].start)
-        for part in parts(picture, chosen.active):
+        for part in parts(picture.with_scene(DIMMED.without(chosen.scene)), chosen.active):  # rays know of no lens
             fine = fine_image(part, crop, quality, which)
             if part.silhouette:
                 fine = np.where(within_cone(part.picture, crop, k), fine, 0.0)
-            levels[rows, columns] += blur_and_bin(fine, camera, k, start)
+            levels[rows, columns] += blur_and_bin(fine, lens_alone(picture.scene), k, start)
     for name in sorted(chosen.active):
         levels = EFFECTS[name].seen(levels, picture)
     return levels
@@ -85,7 +86,7 @@ def window(picture: Picture) -> tuple[slice, slice]:
     corners = np.concatenate([corners, recorded(corners, camera)])
     if np.isnan(corners).any() or scene.floor is not None or backlights(scene):
         return slice(0, camera.height), slice(0, camera.width)
-    margin = 2 + 6 * camera.blur_px + defocus(picture)
+    margin = 2 + 6 * camera.most_blur_px + defocus(picture)
     low, high = np.floor(corners.min(0) - margin), np.ceil(corners.max(0) + margin + 1)
     (left, top), (right, bottom) = (
         np.clip(edge, 0, [camera.width, camera.height]).astype(int).tolist() for edge in (low, high)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
-from imaging.sensor import full_scale, recorded, shot_noise
+from imaging.colour import picture_of, picture_variance, raw, without_filters
+from imaging.sensor import full_scale, shot_noise
 from scenes import InvalidInput, Noise
 from scenes.arrays import grey_levels, picture
 
@@ -17,7 +19,8 @@ def expose(
     """Take ``count`` pictures of the same scene.
 
     The noise is drawn tile by tile, each tile from a stream of its own, so a pixel's noise does not depend on
-    which other pixels are wanted: drawing only part of the image gives the numbers of the whole.
+    which other pixels are wanted: drawing only part of the image gives the numbers of the whole. Of a colour sensor the
+    raw mosaic is drawn, digits and fixed pattern too, and the picture made of it.
 
     Parameters
     ----------
@@ -36,7 +39,7 @@ def expose(
     Returns
     -------
     ndarray of float64, shape (count, height, width)
-        Grey levels; whole numbers from 0 to 2^bits - 1 if the noise has bits.
+        Grey levels; whole numbers from 0 to 2^bits - 1 if the noise has bits, but for a colour sensor's.
 
     Examples
     --------
@@ -51,6 +54,10 @@ def expose(
     image = picture(image)
     if where is not None and not (isinstance(where, np.ndarray) and where.shape == image.shape and where.dtype == bool):
         raise InvalidInput(f"where must be an array of bool, shape {image.shape}, got something else")
+    if noise.colour is not None:
+        near = where if where is None or not noise.colour.interpolates else binary_dilation(where, np.ones((3, 3)))
+        mosaics = expose(raw(noise, np.asarray(image, float)), without_filters(noise), rng, count, near)
+        return picture_of(noise, mosaics)
     key = rng.integers(2**64, size=2, dtype=np.uint64)
     sigma = np.sqrt(noise.sigma**2 + shot_noise(noise, np.asarray(image, float) - noise.dark_level))
     steady = np.asarray(image, float) + fixed_pattern(image, noise)
@@ -77,7 +84,7 @@ def digitised(levels: np.ndarray, noise: Noise) -> np.ndarray:
 
 def variance(image: np.ndarray, noise: Noise) -> np.ndarray:
     """Variance over repeated pictures (not sigma) of each pixel, squared grey levels, shape as the image."""
-    return recorded(noise, grey_levels(image)).noise_variance
+    return picture_variance(noise, grey_levels(image))
 
 
 def fixed_pattern(image: np.ndarray, noise: Noise) -> np.ndarray:

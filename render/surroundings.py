@@ -86,7 +86,7 @@ def _near_required(
     inside = (column >= 0) & (row >= 0) & (column < shape[1]) & (row < shape[0])
     found = np.zeros(shape, bool)
     found[row[inside], column[inside]] = True
-    spread = math.hypot(scene.locator.scale_px, scene.camera.blur_px)
+    spread = math.hypot(scene.locator.scale_px, scene.camera.most_blur_px)
     reach = 1 + (scene.locator.window_px + 4 * spread if within is None else within * spread)
     near = maximum_filter(found, 2 * math.ceil(reach) + 1)
     near.flags.writeable = False

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from scenes.cameras.data_sheet import derived
+
 if TYPE_CHECKING:
     from scenes.cameras.pinhole import Camera
     from scenes.scene import Scene
@@ -65,7 +67,7 @@ def with_number(scene: Scene, key: str, value: float) -> Scene:
     if name == "distance":
         return scene.tried(camera=scene.camera.moved_to(value))
     changed = _changed(scene, steps_of(key), value)
-    if name in scene.camera.sheet:
+    if name in scene.camera.sheet or name.startswith("blur_field.mtf") or name == "blur_field.lp_per_mm":
         return changed.tried(camera=_followed(changed))
     if name in _TWICE:
         scale = value / number_at(scene, key)
@@ -77,8 +79,8 @@ def _followed(scene: Scene) -> Camera:
     """The scene's camera with what follows from its data sheet."""
     camera = scene.camera
     said = {name: getattr(camera, name) for name in type(camera).model_fields}
-    derived = type(camera).derived(said, scene.units, camera.pixel_pitch_um)
-    return camera.tried(**{name: number for name, (number, _) in derived.items()})
+    followed = derived(type(camera), said, scene.units, camera.pixel_pitch_um)
+    return camera.tried(**{name: number for name, (number, _) in followed.items()})
 
 
 def _inner(at: Any, step: str | int) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
 from scenes.cameras import CAMERAS, LENSES, AnyCamera
+from scenes.cameras.colour import Colour
 from scenes.cameras.data_sheet import completed
 from scenes.cameras.noise import Noise
 from scenes.changes import changed
@@ -333,6 +334,24 @@ class Scene(Model):
 
     @model_validator(mode="before")
     @classmethod
+    def _noise_of_its_locator(cls, data: Any) -> Any:
+        """What demosaiced noise is told for: `Locator.scale_px`."""
+        noise, locator = (data.get(key) if isinstance(data, dict) else None for key in ("noise", "locator"))
+        colour = noise.get("colour") if isinstance(noise, dict) else getattr(noise, "colour", None)
+        if not isinstance(colour, dict | Colour):
+            return data
+        scale = locator.get("scale_px") if isinstance(locator, dict) else getattr(locator, "scale_px", None)
+        scale = Locator().scale_px if scale is None else scale
+        if isinstance(colour, dict) and colour.get("scale_px", scale) != scale:
+            raise ValueError(
+                f"noise.colour.scale_px must be locator.scale_px ({scale}) or left out, got {colour['scale_px']}"
+            )
+        told = {**colour, "scale_px": scale} if isinstance(colour, dict) else colour.tried(scale_px=scale)
+        noise = {**noise, "colour": told} if isinstance(noise, dict) else noise.tried(colour=told)
+        return {**data, "noise": noise}
+
+    @model_validator(mode="before")
+    @classmethod
     def _as_on_a_data_sheet(cls, data: Any) -> Any:
         """What a camera's data sheets say of its focal length in px, its width, height and distance."""
         camera = data.get("camera") if isinstance(data, dict) else None
@@ -358,6 +377,7 @@ class Scene(Model):
         check_names("filters", self.filters)
         _ = self.surfaces  # names of faces
         self._check_curved()
+        self._check_colour()
         check_textures(self.textures, self.solid)
         check_uncertain(self, self.uncertain)
         self.uncertainty.check_once(self.uncertain)
@@ -436,6 +456,24 @@ class Scene(Model):
             raise ValueError("camera.lens must be without distortion for a curved object, got one that bends")
         if self.textures:
             raise ValueError(f"textures must be none for a curved object, got {len(self.textures)}")
+
+    def _check_colour(self) -> None:
+        """The picture is not sharper than demosaicing leaves it, nor its locator finer than the pixels read."""
+        colour, blur = self.noise.colour, self.camera.blur_px
+        if colour is not None and blur < colour.blur_px:
+            raise ValueError(
+                f"camera.blur_px must be at least {colour.blur_px:.4g}, by which bilinear demosaicing blurs a picture "
+                f"of {colour.reads} itself, got {blur:g}"
+            )
+        if colour is not None and colour.interpolates and self.camera.blur_field is not None:
+            raise ValueError(
+                f"camera.blur_field must be left out with noise.colour.demosaicing = {colour.demosaicing}, got one"
+            )
+        if colour is not None and self.locator.scale_px < colour.least_scale_px:
+            raise ValueError(
+                f"locator.scale_px must be at least {colour.least_scale_px:g} where only {colour.reads} is read, from "
+                f"every second pixel of every second row, got {self.locator.scale_px:g}"
+            )
 
     def _check_surroundings(self) -> None:
         """Floor below the object."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import scenes
+from measure.fitting.parameters import size_of
 from measure.fitting.result import Fit
 from scenes import Lens
 from scenes.files.door import read_toml
@@ -14,9 +15,10 @@ from scenes.scene import Scene
 from scenes.uncertain import taken_out
 from validation import copied_scene
 
-_CAMERA = ("distance", "roll_deg", "exposure", "blur_px", "focal_px")
+_CAMERA = ("roll_deg", "exposure", "blur_px")
+_SIZE = {"camera.distance": ("distance", "focal_px"), "camera.magnification": ("magnification", "pixel_pitch_um")}
 _NOISE = ("sigma", "gain", "dark_level")
-_SAID_ELSE = ("black_level", "working_distance_mm", "focal_length_mm")  # other names of what has been fitted
+_SAID_ELSE = "black_level", "focal_length_mm", "wavelength_nm"  # other names of what has been fitted
 
 
 def write(found: Fit, source: str, path: Path) -> Scene:
@@ -37,8 +39,10 @@ def write(found: Fit, source: str, path: Path) -> Scene:
 
 def _document(found: Fit, document: dict[str, Any]) -> dict[str, Any]:
     scene = found.scene
-    camera = {key: value for key, value in document["camera"].items() if key not in _SAID_ELSE}
-    camera |= {key: number_at(scene, f"camera.{key}") for key in _CAMERA}
+    size = _SIZE[size_of(scene.camera)]
+    again = ("working_distance_mm",) if "distance" in size else ("focal_px",)
+    camera = {key: value for key, value in document["camera"].items() if key not in (*_SAID_ELSE, *again)}
+    camera |= {key: number_at(scene, f"camera.{key}") for key in (*size, *_CAMERA)}
     camera["look_at"] = list(scene.camera.look_at)
     lens = scene.camera.lens
     if isinstance(lens, Lens) and lens.bends:

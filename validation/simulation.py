@@ -58,17 +58,26 @@ _FINE, _COARSE = 4, 2  # fine pixels a pixel, each way, of images that are compa
 
 @dataclass(frozen=True)
 class How:
-    """How noise-free images are made: as `render.image` takes it, and whether where nothing is measured, too."""
+    """How noise-free images are made: as `render.image` takes it, and whether where nothing is measured, too.
+
+    ``predicted``: whether the closed form of the bias is that of whatever measures in them.
+    """
 
     quality: Quality = Quality()
     variant: str | None = None
     effects: str = "auto"
     tolerance: EffectTolerance = EffectTolerance()
     everywhere: bool = False
+    predicted: bool = False
 
     def by(self, *methods: Method) -> How:
         """Everywhere, if one of the methods looks at more than the surroundings of what is measured."""
-        return replace(self, everywhere=not all(measure.ESTIMATORS[each.locator].local for each in methods))
+        kinds = [measure.ESTIMATORS[each.locator] for each in methods]
+        return replace(
+            self,
+            everywhere=not all(each.local for each in kinds),
+            predicted=all(each.bias_predicted for each in kinds),
+        )
 
     @property
     def rough(self) -> How:
@@ -130,7 +139,7 @@ def mean_of(picture: Picture, renders: tuple[np.ndarray, ...]) -> np.ndarray:
         return renders[0]
     camera = picture.scene.camera
     near = near_required(picture, (slice(0, camera.height), slice(0, camera.width)), 1)
-    inner = binary_erosion(near, iterations=math.ceil(4 * camera.blur_px) + 1, border_value=1)
+    inner = binary_erosion(near, iterations=math.ceil(4 * camera.most_blur_px) + 1, border_value=1)
     return np.where(inner, np.mean(renders, 0), renders[0])
 
 
@@ -191,7 +200,7 @@ def _overall(picture: Picture, how: How) -> np.ndarray:
     for seed in range(2):
         alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
         levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
-        sets.append([levels.image(picture, seed), *map(alike.image, (picture, *_changed_pictures(picture)))])
+        sets.append([levels.image(picture, seed), *map(alike.image, (picture, *_changed_pictures(picture, how)))])
     return np.array(sets)
 
 
@@ -322,8 +331,9 @@ def _completed(
     if dimmed is None:
         others = _steps(first, whole, _of_other_surfaces(picture), picture)
     changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
-    if is_plain(picture.scene):
-        known |= {LIGHT: _light_in_closed_form(picture)}
+    in_closed_form = _light_in_closed_form(picture, how)
+    if in_closed_form is not None:
+        known |= {LIGHT: in_closed_form}
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
         made = whole if _is_below(picture, LARGE) else direct
@@ -331,10 +341,10 @@ def _completed(
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
 
 
-def _changed_pictures(picture: Picture) -> Iterator[Picture]:
+def _changed_pictures(picture: Picture, how: How) -> Iterator[Picture]:
     """With each input changed, in the order of `_completed`'s images."""
     yield from _of_other_surfaces(picture)
-    if not is_plain(picture.scene):
+    if _light_in_closed_form(picture, how) is None:
         yield from _with_lights_moved(picture)
 
 
@@ -421,14 +431,19 @@ def _beside(pose: Pose, step: float) -> Iterator[Pose]:
     yield Pose(math.degrees(math.atan2(math.hypot(x, y), z)), math.degrees(math.atan2(y, x)))
 
 
-def _light_in_closed_form(picture: Picture) -> tuple[np.ndarray, np.ndarray]:
-    """Standard uncertainties (M,) of the classic locators' bias by lights' places, in the object and in the image."""
+def _light_in_closed_form(picture: Picture, how: How) -> tuple[np.ndarray, np.ndarray] | None:
+    """Standard uncertainties (M,) of the bias by lights' places, in the object and in the image.
+
+    None where the closed form of the bias is another one's than that of what measures, or has no value.
+    """
+    if not (how.predicted and is_plain(picture.scene)):
+        return None
     here, found = bias(Pictures.of(picture)), []
     for other in _with_lights_moved(picture):
         moved = bias(Pictures.of(other))
         found.append((moved.values_object - here.values_object, moved.values - here.values))
     squares = np.square(found).sum(0) if found else np.zeros((2, len(picture.scene.quantities)))
-    return tuple(np.sqrt(squares.reshape(2, -1)))
+    return tuple(np.sqrt(squares.reshape(2, -1))) if np.isfinite(squares).all() else None
 
 
 def _u(told) -> float:

@@ -13,7 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from imaging.features.projected_edges import corner_features, straight
-from imaging.geometry.lens import recorded, signed_confusion
+from imaging.geometry.blur import blur_in_focus, signed_confusion
+from imaging.geometry.lens import recorded
 from imaging.geometry.projection import depth, facing, project_ideal
 from imaging.geometry.segments import distance_to_segment, pixels_along
 from imaging.light.appearance import face_signal, is_plain
@@ -125,7 +126,8 @@ class Arrangement:
     camera : Camera, optional
         Whose lens bends and blurs; an ideal one with ``blur_px`` when not given.
     blur_px : float
-        Standard deviation of the lens' blur in focus, px.
+        Standard deviation of the lens' blur in focus, px; where it varies over the image, the mean along what is
+        required.
     """
 
     vertices: np.ndarray
@@ -153,6 +155,13 @@ class Arrangement:
     def recorded(self, ideal: np.ndarray) -> np.ndarray:
         """Where ideal image points (..., 2) are recorded, px."""
         return ideal if self.camera is None else recorded(ideal, self.camera)
+
+    def beside_blur(self, ideal: np.ndarray) -> np.ndarray:
+        """Variance that the field adds to that of ``blur_px`` at ideal points (..., 2), px^2; less than 0 where it is
+        sharper."""
+        if self.camera is None or self.camera.blur_field is None:
+            return np.zeros(np.shape(ideal)[:-1])
+        return np.nan_to_num(blur_in_focus(self.camera, self.recorded(ideal)) ** 2 - self.blur_px**2)
 
     @property
     def level_slices(self) -> tuple[slice, ...]:
@@ -203,9 +212,18 @@ def _arrangement(pictures: Pictures) -> Arrangement:
         required=np.array([edge.ends if i in drawn else (-1, -1) for i, edge in enumerate(required)]),
         edges=np.array(owners, int),
         corners=np.array(vertices, int),
-        camera=camera if camera.lens.bends or camera.aperture_radius > 0 else None,
-        blur_px=camera.blur_px,
+        camera=camera if camera.lens.bends or camera.aperture_radius > 0 or camera.blur_field is not None else None,
+        blur_px=_blur_along(image[np.array([edge.ends for edge in required], int).reshape(-1, 2)], camera),
     )
+
+
+def _blur_along(ends: np.ndarray, camera: Camera) -> float:
+    """The blur in focus along lines between ideal places (E, 2, 2): the root of its mean square, px."""
+    if camera.blur_field is None or not np.isfinite(ends).all((1, 2)).any():
+        return camera.blur_px
+    seen = ends[np.isfinite(ends).all((1, 2))]
+    places = seen[:, :1] + np.linspace(0, 1, 9)[:, None] * (seen[:, 1:] - seen[:, :1])
+    return float(np.sqrt(np.nanmean(blur_in_focus(camera, recorded(places, camera)) ** 2)))
 
 
 def polygon_arrangement(corners: np.ndarray, blur_px: float) -> Arrangement:

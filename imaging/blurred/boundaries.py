@@ -13,11 +13,13 @@ from functools import lru_cache
 import numpy as np
 
 from imaging.blurred.segment import Segments
+from imaging.geometry.lens import image_centre, recorded
 from imaging.geometry.projection import camera_frame, divisor, edge_points, facing, from_axis, in_space
 from imaging.geometry.visibility import boundaries
 from imaging.geometry.visibility import seen as visible_at
 from imaging.light.appearance import face_signal, is_plain, side_signals, sides_of_one
 from imaging.light.between import light_between
+from imaging.light.illumination import fall
 from imaging.pictures import Pictures
 from scenes import Edge, Solid
 
@@ -171,7 +173,19 @@ def _sides(pictures: Pictures, places: Places, at: tuple[np.ndarray, ...], other
     if is_plain(pictures.scene):
         return found[..., 0], gradients
     levels = _looked_at(pictures, picture, other, nearest)
+    if pictures.scene.camera.is_dimmed:  # what is seen past an edge changes as the lens' light does
+        falls = _turned(places.axes[at], fall(pictures.scene.camera, _recorded(pictures, places, at)))
+        gradients = np.where(seen[..., None], gradients, levels[..., None] * falls[:, None])
     return levels, np.where((levels > 0)[..., None], gradients, 0.0)
+
+
+def _recorded(pictures: Pictures, places: Places, at: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Where the places ``at`` are recorded, (P, 2), px."""
+    solid, camera, (picture, edge, _) = pictures.scene.solid, pictures.scene.camera, at
+    images = image_centre(camera) + from_axis(solid.vertices, pictures.sensors, camera)
+    own = np.array([solid.edge(name).ends for name in places.names])[edge]
+    first, last = (images[picture, end] for end in own.T)
+    return recorded(first + places.fractions[at][:, None] * (last - first), camera)
 
 
 def _of_face(pictures: Pictures, places: Places, picture, edge, which, face) -> np.ndarray:

@@ -3,7 +3,8 @@
 With k(u) = Phi((u + 1/2) / s) - Phi((u - 1/2) / s) and its integral K, the part of a pixel that a region covers is the
 integral of k(x) k(y) over the region, and by Green's theorem that of K(x) k(y) dy along its boundary. Moving the
 boundary changes it by the integral of k(x) k(y) times the normal displacement: derivatives cost no more than the image.
-Boundaries are taken where they are recorded, so a lens' distortion is exact; defocus changes s from node to node.
+Boundaries are taken where they are recorded, so a lens' distortion is exact; defocus and the lens' field change s from
+node to node.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from imaging.blurred.kernels import Kernels, Scatter
 from imaging.blurred.quadrature import PieceNodes
 from imaging.geometry.lens import lens_jacobian
 
+_HALFWAY = tuple((1 + each) / 2 if i == 0 else each / 2 for i, each in enumerate(np.polynomial.legendre.leggauss(4)))
 LEAST_BLUR = 0.3  # px; a sharper image is modelled as this sharp
 
 
@@ -89,7 +91,15 @@ class BlurredModel:
         arrangement = self.arrangement
         ends = arrangement.recorded(arrangement.vertices[arrangement.pieces])
         lengths = np.nan_to_num(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1))
-        return PieceNodes.on(lengths, max(arrangement.blur_px, LEAST_BLUR))
+        start, stop = arrangement.vertices[arrangement.pieces].swapaxes(0, 1)[..., None, :]
+        beside = arrangement.beside_blur(start + np.linspace(0, 1, 9)[:, None] * (stop - start)).min(initial=0.0)
+        return PieceNodes.on(lengths, max(float(np.sqrt(max(arrangement.blur_px**2 + beside, 0.0))), LEAST_BLUR))
+
+    @cached_property
+    def _beside_blur(self) -> np.ndarray:
+        """Variance that the field adds at the nodes, where they are expected, (n,)."""
+        start, stop = self.arrangement.vertices[self.arrangement.pieces[self.nodes.piece]].swapaxes(0, 1)
+        return self.arrangement.beside_blur(start + self.nodes.t[:, None] * (stop - start))
 
     @cached_property
     def _window(self) -> tuple[int, int, int, int]:
@@ -153,7 +163,7 @@ class BlurredModel:
             place = arrangement.recorded(place)
             radii = arrangement.defocus[arrangement.pieces[nodes.piece]]
             radius = radii[:, 0] + nodes.t * (radii[:, 1] - radii[:, 0])
-            blur = np.sqrt(state.blur**2 + radius**2 / 4)
+            blur = np.sqrt(np.maximum(state.blur**2 + self._beside_blur + radius**2 / 4, (LEAST_BLUR / 2) ** 2))
         return Traced(place, tangent, area, blur)
 
     def slots(self, kernels: Kernels) -> np.ndarray:
@@ -198,11 +208,11 @@ class BlurredModel:
         covered = self._coverage(traced, kernels)
         if not any(slope.any() for slope in self.slopes):
             return np.concatenate([basis * part for basis, part in zip(self.basis, covered, strict=True)])
-        variance = float(np.mean(traced.blur**2)) + 1 / 12
-        rise = scatter.by_piece(product, self.nodes.weight[:, None] * traced.tangent[:, ::-1] * [-1, 1])
+        wide = self.nodes.weight * (traced.blur**2 + 1 / 12)
+        rise = scatter.by_piece(product, wide[:, None] * traced.tangent[:, ::-1] * [-1, 1])
         parts = zip(self.basis, covered, self.slopes, (self._signs @ rise).swapaxes(0, 1), strict=True)
         return np.concatenate(
-            [basis * part + variance * (slope[:, 0] * to[0] + slope[:, 1] * to[1]) for basis, part, slope, to in parts]
+            [basis * part + slope[:, 0] * to[0] + slope[:, 1] * to[1] for basis, part, slope, to in parts]
         )
 
     @cached_property
@@ -214,8 +224,13 @@ class BlurredModel:
     def _coverage(self, traced: Traced, kernels: Kernels) -> np.ndarray:
         """Part of each pixel that each region covers, (R, P).
 
-        K itself does not end to the left of a node, but K(u) - K(u - 1) does: its sum from the right is K.
+        K itself does not end to the left of a node, but K(u) - K(u - 1) does: its sum from the right is K. That holds
+        of one blur for all nodes, for K reaches past them; what else blurs is added where it is.
         """
+        if np.ptp(traced.blur) > 0:
+            even = traced._replace(blur=np.full(traced.blur.size, np.sqrt(np.mean(traced.blur**2))))
+            around = Kernels.around(even.place, even.blur, LEAST_BLUR)
+            return self._coverage(even, around) + self._beside(traced, even.blur)
         left, _, width, _ = self._window
         s, steps = traced.blur[:, None], np.arange(kernels.x.shape[1] + 1) - 1
         edge = _ramp((kernels.place[:, :1] - kernels.column[:, None] + 1.5 - np.arange(len(steps) + 2)) / s) * s
@@ -229,6 +244,24 @@ class BlurredModel:
         covered[:, self._order] = total[:, :-1] - total[:, self._below]
         covered[BACKGROUND] = 1 - np.delete(covered, BACKGROUND, 0).sum(0)
         return covered
+
+    def _beside(self, traced: Traced, blur: np.ndarray) -> np.ndarray:
+        """What the nodes' own blurs change of the coverage by another blur (n,), (R, P).
+
+        Half the integral, over the variance from the one to the other, of the slope of k(x) k(y) across the boundary:
+        a blurred image obeys the heat equation.
+        """
+        first, added = blur**2, traced.blur**2 - blur**2
+        found = np.zeros((len(self._signs), self.x.size))
+        for place, weight in zip(*_HALFWAY, strict=True):
+            kernels = Kernels.around(traced.place, np.sqrt(first + place * added), LEAST_BLUR)
+            scatter = Scatter(self.slots(kernels), self.nodes.piece, len(self._signs.T), self.x.size)
+            across, down = (self.nodes.weight[:, None] * traced.tangent).T
+            values = (kernels.derivative(0, 1) * down[:, None])[:, None] * kernels.y[:, :, None]
+            values -= (kernels.derivative(1, 1) * across[:, None])[:, :, None] * kernels.x[:, None]
+            found += self._signs @ scatter.by_piece(values, (weight * added / 2)[:, None])[0]
+        found[BACKGROUND] = -np.delete(found, BACKGROUND, 0).sum(0)
+        return found
 
     def contrasts(self, state: State, traced: Traced) -> np.ndarray:
         """First side minus other side at each node, grey levels, (n,)."""

@@ -22,8 +22,8 @@ from imaging.features.rim_sides import (
     steady,
     within_ends,
 )
-from imaging.geometry.lens import blur_at
-from imaging.geometry.projection import depth
+from imaging.geometry.blur import blur_at
+from imaging.geometry.projection import depth, project
 from imaging.pictures import Pictures
 from scenes import Circle
 
@@ -102,10 +102,11 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> RimImag
     normal, slope, speed = outward_normals(pictures, circle, angle)
     across = np.einsum("...ni,...nij->...nj", normal, slope)
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
-    arc, far = speed * circle.turn / angle.size, reach(scene.locator.scale_px, scene.camera.blur_px)
+    arc, far = speed * circle.turn / angle.size, reach(scene.locator.scale_px, scene.camera.most_blur_px)
     turn = circle.turn / (2 * np.pi)
     off_ends = None if circle.ends is None else within_ends(pictures, circle, angle)
-    blur = blur_at(scene.camera, depth(circle.at(angle), pictures.sensors, scene.camera))
+    away = depth(circle.at(angle), pictures.sensors, scene.camera)
+    blur = blur_at(scene.camera, away, project(circle.at(angle), pictures.sensors, scene.camera))
     if seen is not None:
         squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
         return RimImage(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends, blur)

@@ -44,7 +44,7 @@ class Crossing(NamedTuple):
         return 3 * np.asarray(noise_variance) / (16 * np.pi * scale**6) / self.slope**2
 
 
-def limb_crossing(profile: Profile, beyond, blur_px: float, scale: float, curvature=0.0, fourth=0.0) -> Crossing:
+def limb_crossing(profile: Profile, beyond, blur_px, scale: float, curvature=0.0, fourth=0.0) -> Crossing:
     """The crossing of the gradient locator.
 
     Parameters
@@ -53,8 +53,10 @@ def limb_crossing(profile: Profile, beyond, blur_px: float, scale: float, curvat
         Of the body's level, n points.
     beyond : float or ndarray, shape (n,)
         Level beside the body, grey levels.
-    blur_px, scale : float
-        Standard deviations of lens and locator, px.
+    blur_px : float or ndarray, shape (n,)
+        Standard deviation of the lens' blur, px.
+    scale : float
+        Of the locator's, px.
     curvature : float or ndarray, shape (n,)
         Of the limb's image (`Strand.curvature`), 1 / px: to first order w^2 / 2 of it is added inwards.
     fourth : float or ndarray, shape (n,)
@@ -69,11 +71,11 @@ def limb_crossing(profile: Profile, beyond, blur_px: float, scale: float, curvat
     >>> bool(abs(found.shift) < 1e-9), bool(np.isclose(found.variance(4.0, 1.0), kappa2(1.0, 0.6) * 4.0 / 80**2))
     (True, True)
     """
-    width = float(np.hypot(edge_blur(blur_px), scale))
+    width = np.hypot(edge_blur(blur_px), scale) * np.ones(len(profile.coefficients))
     terms = profile.coefficients.astype(float).copy()
     terms[:, 0] -= beyond
     powers = np.arange(terms.shape[1]) / 2
-    weights = terms * gamma(powers + 1) * width**powers
+    weights = terms * gamma(powers + 1) * width[:, None] ** powers
     square = np.broadcast_to(np.asarray(fourth, float) / 24 / width**4, len(terms))
     x, step, slope = np.zeros(len(terms)), np.full(len(terms), np.inf), np.zeros(len(terms))
     live = np.flatnonzero(np.isfinite(weights).all(1) & weights.any(1))

@@ -10,19 +10,22 @@ from numpy.polynomial import chebyshev
 
 from imaging import sensor
 from imaging.contours.shading import Profile, fitted
+from imaging.features.demosaiced import place_shifts
 from imaging.features.limb_lent import unlent, unlent_by_faces
 from imaging.features.limb_locator import box_cumulant, limb_crossing
 from imaging.features.limb_outline import LimbOutline, clear_of_ends, framed
 from imaging.features.locator import edge_blur, reach
 from imaging.features.rim_sides import RIM_POINTS, steady, to_curve
 from imaging.features.sampling import sampled_places
+from imaging.geometry.blur import blur_in_focus
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import from_axis, ray_origins, rays
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, has_background, signal
+from imaging.light.illumination import fall
 from imaging.light.revolved import light_around, passes, rings_of
 from imaging.pictures import Pictures
-from scenes import Curved
+from scenes import Camera, Curved
 
 _NODES = 12  # places inside the limb at which the level is found
 _ALONG = 17  # places of a straight edge at which it is asked whether it is seen
@@ -57,19 +60,20 @@ class LimbLook:
 def limb_look(pictures: Pictures, curved: Curved, outline: LimbOutline) -> LimbLook:
     """Look at a limb; of one picture or of many alike."""
     scene = pictures.scene
-    far, seen = reach(scene.locator.scale_px, scene.camera.blur_px), seen_along(pictures, curved, outline)
+    far, seen = reach(scene.locator.scale_px, scene.camera.most_blur_px), seen_along(pictures, curved, outline)
     safe = np.where(outline.seen[..., None], outline.points, scene.solid.vertices[0])
     inside, terms = _profile(pictures, curved, outline, safe, far)
     beyond = np.broadcast_to(_beyond(pictures, curved, safe, seen), inside.shape[:-1])
     seen = np.broadcast_to(seen, inside.shape[:-1])
     outward = np.nan_to_num(outline.outward)
     curvature = np.broadcast_to(np.nan_to_num(outline.curvature), beyond.shape)
+    blur = np.broadcast_to(blur_in_focus(scene.camera, _recorded(outline, scene.camera)), beyond.shape)
     crossing = limb_crossing(
-        Profile(terms.coefficients, terms.left_out), beyond.ravel(), scene.camera.blur_px, scene.locator.scale_px,
+        Profile(terms.coefficients, terms.left_out), beyond.ravel(), blur.ravel(), scene.locator.scale_px,
         curvature.ravel(), box_cumulant(np.broadcast_to(outward, (*beyond.shape, 2)).reshape(-1, 2)),
     )  # fmt: skip
     shift, slope = (part.reshape(beyond.shape) for part in crossing)
-    width = np.hypot(edge_blur(scene.camera.blur_px), scene.locator.scale_px)
+    width = np.hypot(edge_blur(blur), scene.locator.scale_px)
     contrast = np.sqrt(2 * np.pi) * width**3 * slope
     near = inside[..., _NODES // 3]
     sides = np.stack([near, beyond], -2)
@@ -83,6 +87,10 @@ def limb_look(pictures: Pictures, curved: Curved, outline: LimbOutline) -> LimbL
         good &= (contrast > 0) == (near > beyond)
         good &= np.maximum(inside.max(-1), beyond) <= sensor.headroom(scene.noise)
         good &= scene.camera.aperture_radius == 0  # a cone of light touches a round wall in many places
+    if scene.camera.is_dimmed:  # what is seen past the limb changes as the lens' light does
+        falls = (fall(scene.camera, _recorded(outline, scene.camera)) * outward).sum(-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shift = shift + np.where(good, width**2 * beyond * falls / (beyond - near), 0.0)
     squared = np.where(seen, np.where(good, contrast, step) ** 2, 0.0)
     shift = shift + _sampled(pictures, outline)
     return LimbLook(np.where(good, shift, 0.0), squared, noise, good)
@@ -101,8 +109,14 @@ def seen_along(pictures: Pictures, curved: Curved, outline: LimbOutline) -> np.n
 def _sampled(pictures: Pictures, outline: LimbOutline) -> np.ndarray:
     """What sampling by pixels adds, px: much where a wall's line runs along their rows."""
     camera, scale = pictures.scene.camera, pictures.scene.locator.scale_px
-    at, outward = np.nan_to_num(outline.at) + image_centre(camera), np.nan_to_num(outline.outward)
-    return sampled_places(at, outward, camera.blur_px, scale)
+    at, outward = _recorded(outline, camera), np.nan_to_num(outline.outward)
+    mixed = place_shifts(pictures.scene.noise.colour, at, outward, camera.blur_px, scale)
+    return sampled_places(at, outward, blur_in_focus(camera, at), scale) + mixed
+
+
+def _recorded(outline: LimbOutline, camera: Camera) -> np.ndarray:
+    """Where the places are recorded, px, (..., n, 2); somewhere where they are not seen."""
+    return np.nan_to_num(outline.at) + image_centre(camera)
 
 
 def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook) -> np.ndarray:
@@ -114,7 +128,7 @@ def clear_of_others(pictures: Pictures, curved: Curved, outline: LimbOutline, se
     found = found & unlent_by_faces(pictures, curved, outline)
     if scene.bodies.is_convex:
         return found
-    far = reach(scene.locator.scale_px, scene.camera.blur_px)
+    far = reach(scene.locator.scale_px, scene.camera.most_blur_px)
     found = found & ~_disturbed(pictures, outline, far)
     lit = np.where(seen.good, seen.squared, 0.0)
     return found & steady(lit, np.zeros(lit.shape), np.nan_to_num(outline.arc), far)

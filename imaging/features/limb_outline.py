@@ -108,4 +108,4 @@ def framed(outline: LimbOutline, scene: Scene) -> np.ndarray:
 def clear_of_ends(outline: LimbOutline, scene: Scene) -> np.ndarray:
     """Which places no end of their line disturbs, bool, shape (..., n)."""
     with np.errstate(invalid="ignore"):
-        return outline.from_end >= reach(scene.locator.scale_px, scene.camera.blur_px)
+        return outline.from_end >= reach(scene.locator.scale_px, scene.camera.most_blur_px)

@@ -12,7 +12,8 @@ import numpy as np
 from imaging.features.circles import RimImage
 from imaging.features.limb_look import LimbLook, clear_of_others, limb_look
 from imaging.features.limb_outline import LIMB_POINTS, LimbOutline, limb_outline
-from imaging.geometry.lens import blur_at
+from imaging.geometry.blur import blur_at
+from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import depth
 from imaging.pictures import Pictures
 from scenes import Curved
@@ -29,7 +30,7 @@ def _limb_rim(pictures: Pictures, curved: Curved) -> RimImage:
     clear = seen.good & clear_of_others(pictures, curved, outline, seen)
     camera = pictures.scene.camera
     away = depth(np.where(outline.seen[..., None], outline.points, curved.centre), pictures.sensors, camera)
-    return rim_of(outline, seen, clear, blur_at(camera, away))
+    return rim_of(outline, seen, clear, blur_at(camera, away, np.nan_to_num(outline.at) + image_centre(camera)))
 
 
 def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray, blur: np.ndarray | float = 0.0) -> RimImage:

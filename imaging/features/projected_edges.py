@@ -109,7 +109,7 @@ def _project(pictures: Pictures, names: tuple[str, ...]) -> ProjectedEdges:
     edges = [solid.edge(name) for name in names]
     needed, clear, lead = (
         _near(solid, edges),
-        reach(scene.locator.scale_px, scene.camera.blur_px),
+        reach(scene.locator.scale_px, scene.camera.most_blur_px),
         sensors.shape[:-1],
     )
     corners = dict(

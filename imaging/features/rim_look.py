@@ -15,7 +15,8 @@ from imaging import sensor
 from imaging.features.locator import edge_blur
 from imaging.features.rim_outline import facets, outline_beside, zero_of_steps
 from imaging.features.rim_sides import RIM_POINTS, outward_normals
-from imaging.geometry.lens import blur_at, image_centre, lens_jacobian
+from imaging.geometry.blur import blur_at
+from imaging.geometry.lens import image_centre, lens_jacobian, recorded
 from imaging.geometry.projection import depth, from_axis
 from imaging.light.appearance import seen_at
 from imaging.pictures import Pictures
@@ -132,8 +133,10 @@ def _normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.
     """Image points and normals (n, 2) and the smoothed edge's standard deviation (n,) there, ideal px."""
     scene = pictures.scene
     places, normals = _places(pictures, circle, angle), outward_normals(pictures, circle, angle)[0]
-    stretch = np.sqrt(np.abs(np.linalg.det(lens_jacobian(places + image_centre(scene.camera), scene.camera))))
-    blur = blur_at(scene.camera, depth(circle.at(angle), pictures.sensors, scene.camera))
+    ideal = places + image_centre(scene.camera)
+    stretch = np.sqrt(np.abs(np.linalg.det(lens_jacobian(ideal, scene.camera))))
+    away = depth(circle.at(angle), pictures.sensors, scene.camera)
+    blur = blur_at(scene.camera, away, recorded(ideal, scene.camera))
     return places, normals, np.hypot(scene.locator.scale_px, edge_blur(blur)) / stretch
 
 

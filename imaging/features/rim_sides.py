@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from imaging.features.locator import edge_blur, reach
-from imaging.geometry.projection import from_axis, jacobian_ideal
+from imaging.geometry.blur import blur_in_focus
+from imaging.geometry.projection import from_axis, jacobian_ideal, project
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import behind, face_signal, of_sides
 from imaging.pictures import Pictures
@@ -34,7 +35,7 @@ def within_ends(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.nda
     there = _image(pictures, circle.at(angle))
     ends = _image(pictures, circle.ends)
     nearest = np.linalg.norm(there[..., None, :] - ends[..., None, :, :], axis=-1).min(-1)
-    return nearest >= reach(scene.locator.scale_px, scene.camera.blur_px)
+    return nearest >= reach(scene.locator.scale_px, scene.camera.most_blur_px)
 
 
 def outward_normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -78,7 +79,8 @@ def shading_shift(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.n
         towards = np.einsum("...i,...i->...", np.broadcast_to(facing, at.shape), view.towards(at))
         slopes.append(np.where((level > 0) & (there > 0) & (towards > 0), (there - level) / _STEP, 0.0))
     contrast = levels[..., 0, :] - levels[..., 1, :]  # face less wall; outside less inside, or the other way round
-    variance = scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
+    blur = blur_in_focus(scene.camera, project(points, pictures.sensors, scene.camera))
+    variance = scene.locator.scale_px**2 + edge_blur(blur) ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         found = sense * variance * (slopes[0] + slopes[1]) / contrast
     return np.where(np.isfinite(found), found, 0.0)

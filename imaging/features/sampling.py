@@ -15,10 +15,11 @@ import numpy as np
 from imaging.features.locator import edge_blur
 
 _TABLE = np.linspace(-1, 1, 1025)  # cosine between n and m
+_BLUR_STEP, _NO_MORE = 0.02, 1.5  # px: between blurs that are tabled, and beyond which pixels are no longer felt
 _ORDERS = np.array([[1, 0], [0, 1]])  # further terms are below 1e-9 px
 
 
-def sampled_line(middle, tangent, length, blur_px: float, scale: float) -> tuple[np.ndarray, np.ndarray]:
+def sampled_line(middle, tangent, length, blur_px, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Mean shift along the normal (-t_y, t_x), px, and its slope, of the line through the crossings of a lone edge.
 
     Parameters
@@ -29,26 +30,42 @@ def sampled_line(middle, tangent, length, blur_px: float, scale: float) -> tuple
         Unit direction t.
     length : ndarray, shape (...)
         Of the used part, px.
-    blur_px, scale : float
-        Of the lens and of the locator, px.
+    blur_px : float or ndarray, shape (...)
+        Of the lens, px.
+    scale : float
+        Of the locator, px.
     """
     phase = 2 * np.pi * middle @ _ORDERS.T
     x = np.pi * length[..., None] * (tangent @ _ORDERS.T)
     normal = np.stack([-tangent[..., 1], tangent[..., 0]], -1)
-    amplitude = np.interp(normal @ _ORDERS.T, _TABLE, _amplitudes(blur_px, scale))
+    amplitude = _amplitude(normal @ _ORDERS.T, blur_px, scale)
     with np.errstate(divide="ignore", invalid="ignore"):
         lever = np.where(np.abs(x) < 1e-3, x / 3, (np.sin(x) - x * np.cos(x)) / x**2)
     mean = (amplitude * np.sin(phase) * np.sinc(x / np.pi)).sum(-1)
     return mean, (amplitude * np.cos(phase) * lever).sum(-1) * 6 / length
 
 
-def sampled_places(places: np.ndarray, normals: np.ndarray, blur_px: float, scale: float) -> np.ndarray:
+def sampled_places(places: np.ndarray, normals: np.ndarray, blur_px, scale: float) -> np.ndarray:
     """Shift (...) along unit normals (..., 2), px, of a lone edge's crossing at places (..., 2), px."""
-    amplitude = np.interp(normals @ _ORDERS.T, _TABLE, _amplitudes(blur_px, scale))
+    amplitude = _amplitude(normals @ _ORDERS.T, blur_px, scale)
     return (amplitude * np.sin(2 * np.pi * places @ _ORDERS.T)).sum(-1)
 
 
-@lru_cache(maxsize=16)
+def _amplitude(cosine: np.ndarray, blur_px, scale: float) -> np.ndarray:
+    """The largest shift, px, at cosines (..., 2) of places of some blur, one or (...); between blurs linear."""
+    if np.ndim(blur_px) == 0:
+        return np.interp(cosine, _TABLE, _amplitudes(float(blur_px), scale))
+    place = np.minimum(np.nan_to_num(np.broadcast_to(blur_px, cosine.shape[:-1])), _NO_MORE)[..., None] / _BLUR_STEP
+    first, found = np.floor(place).astype(int), np.zeros(cosine.shape)
+    for number in np.unique(first):
+        less, more = (_amplitudes(_BLUR_STEP * (number + each), scale) for each in (0, 1))
+        here, share = (first == number), place - number
+        shift = (1 - share) * np.interp(cosine, _TABLE, less) + share * np.interp(cosine, _TABLE, more)
+        found = np.where(here, shift, found)
+    return found
+
+
+@lru_cache(maxsize=128)
 def _amplitudes(blur_px: float, scale: float) -> np.ndarray:
     """Largest shift, px, of the crossing by one of `_ORDERS` for the cosines of `_TABLE`; its sine goes with the phase.
 

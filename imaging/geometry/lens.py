@@ -51,28 +51,6 @@ def lens_jacobian(ideal: np.ndarray, camera: Camera) -> np.ndarray:
     return camera.lens.slope((ideal - image_centre(camera)) / camera.focal_px)
 
 
-def signed_confusion(camera: Camera, depth: np.ndarray) -> np.ndarray:
-    """Radius of the circle of confusion of a thin lens at depths (scene units), px; negative beyond the focus.
-
-    R f (F - z) / (D(z) D(F)), R the aperture's radius, f the ``focal_px``, F the focus, D the camera's divisor. Of a
-    pinhole with an aperture D is the depth, and this R f (1 / z - 1 / F).
-    """
-    focus = camera.lens.focus or camera.distance
-    return camera.aperture_radius * camera.focal_px * (focus - depth) / (camera.divisor(depth) * camera.divisor(focus))
-
-
-def confusion(camera: Camera, depth: np.ndarray) -> np.ndarray:
-    """The same without sign."""
-    return np.abs(signed_confusion(camera, depth))
-
-
-def blur_at(camera: Camera, depth: np.ndarray) -> np.ndarray | float:
-    """Standard deviation of the blur at depths (scene units), px: the Gaussian's and a quarter of the disc's r^2."""
-    if camera.aperture_radius == 0:
-        return camera.blur_px
-    return np.sqrt(camera.blur_px**2 + confusion(camera, depth) ** 2 / 4)
-
-
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solution of (..., 2, 2) systems; infinite or NaN where they are singular."""
     (a, b), (c, d) = np.moveaxis(matrix, (-2, -1), (0, 1))

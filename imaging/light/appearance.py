@@ -19,6 +19,7 @@ from imaging.geometry.visibility import seen, turned
 from imaging.light.backlight import backlights, backlit
 from imaging.light.between import light_between
 from imaging.light.emitters import is_point
+from imaging.light.illumination import dimming
 from imaging.light.irradiance import bands, beam, electric_field, squared_distance, widened
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
@@ -54,9 +55,10 @@ def has_background(scene: Scene) -> bool:
 def is_separable(scene: Scene) -> bool:
     """Whether a face's signal is a number times 1 / r^3, r the distance from the light.
 
-    One convex body before darkness, diffuse, without print, under one point of light.
+    One convex body before darkness, diffuse, without print, under one point of light, through a lens that passes it
+    evenly.
     """
-    plain = is_plain(scene) and not printed(scene)
+    plain = is_plain(scene) and not printed(scene) and not scene.camera.is_dimmed
     return plain and scene.surfaces.is_diffuse and is_point(scene.lights)
 
 
@@ -98,7 +100,7 @@ def signal(
         value = material.reflected(index, normals, arriving.to_light, to_sensor, *across)
         value = scene.camera.exposure * arriving.strength * value
         total = total + (value if lit is None else np.where(lit[i], value, 0.0))
-    return total
+    return total * dimming(pictures, points, axes) if scene.camera.is_dimmed else total
 
 
 def face_signal(

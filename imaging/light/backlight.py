@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.geometry.projection import frame
+from imaging.light.illumination import dimming
 from imaging.light.irradiance import electric_field, widened
 from imaging.pictures import Pictures
 from scenes import Scene
@@ -39,6 +40,7 @@ def backlit(
         place = t[..., None] * vectors - away
         cosine = -towards / np.linalg.norm(vectors, axis=-1)
         shown = light.seen_at((place * right).sum(-1), (place * down).sum(-1), cosine) * (t > 0)
+    shown = shown * dimming(pictures, points + vectors, 1)
     return shown * scene.camera.exposure * light.intensity * passed(pictures, which, analyser)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from imaging.light.bore import Bore, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters
 from imaging.light.exchange import Exchanged, exchanged, once_reflected
+from imaging.light.illumination import dimming_of_one
 from imaging.light.irradiance import beam
 from imaging.pictures import Pictures
 from scenes import Scene
@@ -41,7 +42,8 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
             found[inside] = _of_wall(scene, shining, bore, pictures.roughly).ev(*place_in(bore, points[inside]))
     analysed = scene.camera.analyser_deg is not None
     white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
-    return scene.camera.exposure * white[scene.surfaces.kinds[faces]] * np.where(asked, found, 0.0)
+    found = scene.camera.exposure * white[scene.surfaces.kinds[faces]] * np.where(asked, found, 0.0)
+    return found * dimming_of_one(pictures, points)
 
 
 def light_of_dimmed(

@@ -15,6 +15,7 @@ import numpy as np
 
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter, emitters
+from imaging.light.illumination import dimming_of_one
 from imaging.light.irradiance import beam
 from imaging.pictures import Pictures
 from scenes import Curved, Scene, Solid
@@ -96,7 +97,8 @@ def light_around(pictures: Pictures, curved: Curved, points: np.ndarray) -> np.n
     away = points - rings.origin
     angle = np.arctan2(away @ rings.axes[1], away @ rings.axes[0]) % (2 * np.pi)
     white = scene.surfaces.of(curved.faces[0]).diffuse(scene.camera.analyser_deg is not None)
-    return scene.camera.exposure * white * np.maximum(told.ev(away @ rings.axes[2], angle), 0.0)
+    found = scene.camera.exposure * white * np.maximum(told.ev(away @ rings.axes[2], angle), 0.0)
+    return found * dimming_of_one(pictures, points)
 
 
 def passes(rings: Rings, start: np.ndarray, stop: np.ndarray) -> np.ndarray:

@@ -9,7 +9,8 @@ import numpy as np
 from imaging.features.locator import reach
 from imaging.features.measurand import Measurands, measurands, normals
 from imaging.features.projected_edges import ProjectedEdges, cut, edge_ends, end_divisors, image_fractions
-from imaging.geometry.lens import blur_at, lens_jacobian
+from imaging.geometry.blur import blur_at
+from imaging.geometry.lens import lens_jacobian, recorded
 from imaging.geometry.projection import depth, in_space
 from imaging.geometry.visibility import longest_span
 from imaging.light.appearance import edge_contrast
@@ -82,16 +83,16 @@ def place_nodes(pictures: Pictures, view: ProjectedEdges, trims: np.ndarray) -> 
     spatial = in_space(fractions, near, far)
     ends = depth(edge_ends(pictures.scene, view.names), pictures.sensors, camera)
     ends = ends.reshape(*ends.shape[:-1], len(view.names), 2)
-    blur = blur_at(camera, ends[..., :1] + spatial * (ends[..., 1:] - ends[..., :1]))
+    places = view.ends[..., :1, :] + fractions[..., None] * view.along[..., None, :]
+    blur = blur_at(camera, ends[..., :1] + spatial * (ends[..., 1:] - ends[..., :1]), recorded(places, camera))
     across = along = 1.0
     if camera.lens.bends:
-        across, along = _magnified(camera, view, fractions)
+        across, along = _magnified(camera, view, places)
     return EdgeNodes(t, middle, length, spatial, blur, across, along)
 
 
-def _magnified(camera, view: ProjectedEdges, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ideal px across for a recorded px, and recorded px along for an ideal px, at fractions of the image's length."""
-    places = view.ends[..., :1, :] + fractions[..., None] * view.along[..., None, :]
+def _magnified(camera, view: ProjectedEdges, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ideal px across for a recorded px, and recorded px along for an ideal px, at ideal places (..., E, n, 2)."""
     slope = lens_jacobian(places, camera)
     tangent = view.along / np.where(view.lengths > 0, view.lengths, np.nan)[..., None]
     (a, b), (c, d) = np.moveaxis(slope, (-2, -1), (0, 1))
@@ -109,7 +110,7 @@ def used_trims(pictures: Pictures, view: ProjectedEdges, *, trimmed: bool) -> np
         return trims
     spans = [_span(pictures, scene.solid.edge(name)) for name in view.names]
     shown = image_fractions(scene, view.names, pictures.sensors, np.stack(spans, -2))
-    return cut(trims, shown, view.lengths, reach(scene.locator.scale_px, scene.camera.blur_px) if trimmed else 0.0)
+    return cut(trims, shown, view.lengths, reach(scene.locator.scale_px, scene.camera.most_blur_px) if trimmed else 0.0)
 
 
 def _span(pictures: Pictures, edge: Edge) -> np.ndarray:

@@ -15,11 +15,13 @@ import numpy as np
 from imaging.blurred.boundaries import Boundaries, Places, boundaries_near
 from imaging.blurred.clipped_step import clipped
 from imaging.blurred.segment import Segments, second_and_third
+from imaging.features.demosaiced import line_shift
 from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.features.measurand import Measurands, corner_response, measurands, normals
 from imaging.features.projected_edges import edge_ends
 from imaging.features.sampling import sampled_line
-from imaging.geometry.lens import confusion, lens_jacobian
+from imaging.geometry.blur import blur_in_focus, confusion
+from imaging.geometry.lens import lens_jacobian
 from imaging.geometry.lens import recorded as recorded_at
 from imaging.geometry.projection import depth, edge_points
 from imaging.light.appearance import is_plain, side_signals
@@ -207,11 +209,12 @@ def _sampled(pictures: Pictures, nodes: EdgeNodes) -> tuple[np.ndarray, np.ndarr
     along = np.einsum("...ij,...j->...i", lens_jacobian(middle, scene.camera), view.along)
     size = np.linalg.norm(along, axis=-1)
     length = nodes.length[..., 0] * size / view.lengths
-    mean, turn = sampled_line(
-        recorded_at(middle, scene.camera), along / size[..., None], length, scene.camera.blur_px, scene.locator.scale_px
-    )
+    there, scale = recorded_at(middle, scene.camera), scene.locator.scale_px
+    tangent = along / size[..., None]
+    mean, turn = sampled_line(there, tangent, length, blur_in_focus(scene.camera, there), scale)
+    mixed, mixed_turn = line_shift(scene.noise.colour, there, tangent, length, scene.camera.blur_px, scale)
     across = np.broadcast_to(nodes.across, nodes.t.shape).mean(-1)
-    return mean * across, turn * across * size / view.lengths
+    return (mean + mixed) * across, (turn + mixed_turn) * across * size / view.lengths
 
 
 def _crossings(pictures: Pictures, nodes: EdgeNodes, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ elsewhere it changes nothing (`information(..., with_knowledge=False)` is the bo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from imaging.models.edge_bound import edge_bound
 from imaging.models.errors import Errors
 from imaging.pictures import Pictures
 from imaging.sensor import Levels, recorded, sensitivity
-from scenes import Noise
+from scenes import Noise, Scene
 
 REACH = 32.0  # px from a required edge up to which pixels count; levels are hardly better known from more
 KNOWN_LEVELS = 1.0  # of a lit face's level, and of what its slopes make of it: how well they are known from the light
@@ -176,6 +177,7 @@ def bound(pictures: Pictures) -> Errors:
     Where things hide or shade each other, of circles and of the largest of some numbers, it is that of each edge by
     itself. Of a form, a maximum less a minimum, there is no bound: its variance is that of the calibrated model.
     """
+    pictures = pictures if pictures.scene.noise.colour is None else pictures.with_scene(_of_raw(pictures.scene))
     alone = edge_bound(pictures)
     known = alone.measurands
     if not (is_plain(pictures.scene) and lines_alone(pictures.scene)):
@@ -194,6 +196,16 @@ def bound(pictures: Pictures) -> Errors:
 
     joint = variances, variances_object
     return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), joint=joint)
+
+
+def _of_raw(scene: Scene) -> Scene:
+    """A scene whose picture tells at least as much as its colour sensor's raw mosaic: all pixels are the strongest."""
+    colour, noise, camera = scene.noise.colour, scene.noise, scene.camera
+    most = max(colour.response)
+    sharp = math.sqrt(max(camera.blur_px**2 - colour.blur_px**2, 0.0))
+    bits = noise.bits if most == 1 else None  # rounding and the end of the scale only take away
+    grey = noise.tried(colour=None, sigma=noise.sigma / most, gain=noise.gain / most, bits=bits)
+    return scene.tried(noise=grey, camera=camera.tried(blur_px=sharp))
 
 
 def _unit(known: Measurands) -> np.ndarray:

@@ -48,7 +48,7 @@ def _strong_pieces(pictures: Pictures, view: ProjectedEdges) -> np.ndarray:
     near, far = end_divisors(scene, view.names, pictures.sensors)
     spatial = in_space(fractions, near, far)
     contrast = _over_noise(pictures, view.names, edge_points(scene.solid, view.names, spatial))
-    clear = reach(scene.locator.scale_px, scene.camera.blur_px)
+    clear = reach(scene.locator.scale_px, scene.camera.most_blur_px)
     lead = np.broadcast_shapes(contrast.shape[:-1], view.lengths.shape)
     found = np.empty((*lead, 2))
     contrast, lengths = np.broadcast_to(contrast, (*lead, _PLACES)), np.broadcast_to(view.lengths, lead)

@@ -183,7 +183,9 @@ class CannyLocator:
         y, x = np.divmod(pixels, self.optics.shape[1])
         _, across = self.caliper.coordinates(self.optics.ideal(np.stack([x, y], -1)[:, None] + NODES))
         image = np.zeros(self.optics.shape)
-        image.flat[pixels] = self._step * half_plane(across / max(self.optics.blur_px, 0.3)) @ NODE_WEIGHTS
+        middle = self.caliper.at(self.caliper.positions.mean(), np.zeros(()))
+        blur = max(float(self.optics.blur_at(self.optics.recorded(middle))), 0.3)
+        image.flat[pixels] = self._step * half_plane(across / blur) @ NODE_WEIGHTS
         return image
 
 

@@ -83,7 +83,7 @@ def likeliest_ellipse(
     seen : Sought
         Pixels beside other parts of the outline do not count.
     """
-    shape, blur, free = start, max(optics.blur_px, LEAST_BLUR), free_parameters(circle)
+    shape, blur, free = start, max(float(optics.blur_at(start[:2])), LEAST_BLUR), free_parameters(circle)
     widest = _WIDEST * blur
     for _ in range(_STEPS):
         model = _Linear.at(image, shape, blur, optics, free, seen)
@@ -208,7 +208,7 @@ class _Linear:
 
 def _near(shape: np.ndarray, optics: Optics, seen: Sought) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns (W,) and rows (H,) around an ellipse in the image, and which of their pixels are used, (H, W)."""
-    band = _BAND * CLEARANCE * edge_blur(optics.blur_px)
+    band = _BAND * CLEARANCE * edge_blur(optics.most_blur_px)
     reach = np.array([np.hypot(shape[2], shape[4]), np.hypot(shape[3], shape[4])]) + band
     low = np.maximum(np.floor(shape[:2] - reach), 0).astype(int)
     high = np.minimum(np.ceil(shape[:2] + reach) + 1, optics.shape[::-1]).astype(int)

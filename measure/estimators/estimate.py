@@ -53,13 +53,12 @@ class Estimator(Protocol):
 def noisy(rows: np.ndarray, optics: Optics, images: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Covariance of linear functions ``rows`` (k, P) of some pixels of images, (k, k) or (n, k, k).
 
-    Where the noise depends on the light each pixel's variance is taken at the level that it shows: what its own noise
-    does to that averages out over the pixels.
+    As `Optics.independent` takes them.
     """
     used = images.reshape(len(images), -1)[:, pixels] if optics.noise is not None else np.zeros((1, 1))
-    variance = optics.noise_at(used)
-    if variance is None:
-        return optics.noise_variance * (rows @ rows.T)
+    rows, variance = optics.independent(rows, pixels, used)
+    if isinstance(variance, float):
+        return variance * (rows @ rows.T)
     k, (first, second) = len(rows), np.triu_indices(len(rows))
     whole = np.empty((len(images), k, k))
     whole[:, first, second] = whole[:, second, first] = variance @ (rows[first] * rows[second]).T

@@ -32,7 +32,8 @@ def gradient_along(
     """
     offsets, across, toward = places_across(places, normals, optics.window_px)
     pixels, kernel = reached(second_derivative(across, toward, optics.scale_px, optics.shape))
-    total = np.hypot(optics.scale_px, edge_blur(optics.blur_px if blur is None else blur)) * np.ones(len(places))
+    blur = optics.blur_at(places) if blur is None else blur
+    total = np.hypot(optics.scale_px, edge_blur(blur)) * np.ones(len(places))
     nothing = np.zeros((len(places), 0)), np.zeros((0, pixels.size))
     return CrossingLocator(
         positions, offsets, pixels, kernel, np.sqrt(2 * np.pi) * total**3, gain * np.ones(len(places)),

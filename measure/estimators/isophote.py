@@ -90,8 +90,8 @@ def _misled(layout: Layout, index: int, caliper: Caliper, levels: list[_Level]) 
 def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> _Level:
     """The level on one side of an edge."""
     face = int(layout.sides[index, (1 - sign) // 2])
-    start = TRIM * edge_blur(layout.optics.blur_px)
-    even = face == BACKGROUND or layout.shadings[face] is not None
+    start = TRIM * edge_blur(layout.optics.most_blur_px)
+    even = not layout.optics.dimmed if face == BACKGROUND else layout.shadings[face] is not None
     flat, points, along, across = pixels_beside(caliper, _BAND * start if even else max(HALF_WIDTH, _BAND * start))
     clearance = sign * across
     for segment in (*layout.ends[layout.visible], *layout.others):

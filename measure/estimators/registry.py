@@ -9,6 +9,7 @@ from measure.estimators.kinds import ESTIMATORS
 from measure.features.layout import Layout
 from scenes import InvalidInput, Scene
 
+_ALIKE = ("strip", "arrangement")  # those that take pixels for independent and equally noisy
 SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement
 
 for _name, _kind in {
@@ -22,9 +23,10 @@ def best_estimator(scene: Scene) -> str:
     """What an image of a scene is best measured by: ``arrangement`` where one convex body stands before darkness.
 
     There it is the most precise, and tells by its goodness of fit whether the image is what it takes it for. Where
-    things hide or shade each other, ``gradient``, whose errors and bias the planner knows.
+    things hide or shade each other, and where a colour sensor's pixels are not alike, ``gradient``, whose errors and
+    bias the planner knows.
     """
-    return "arrangement" if is_plain(scene) else "gradient"
+    return "arrangement" if is_plain(scene) and scene.noise.colour is None else "gradient"
 
 
 def known_name(name: str) -> str:
@@ -54,4 +56,9 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     name = known_name(name)
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
+    if layout.optics.colour is not None and name in _ALIKE:
+        others = ", ".join(each for each in ESTIMATORS if each not in _ALIKE)
+        raise InvalidInput(
+            f"estimator must be one of {others} with noise.colour, whose pixels are not alike, got {name!r}"
+        )
     return ESTIMATORS[name].prepare(layout, threshold)

@@ -37,7 +37,7 @@ def calipers_for(layout: Layout, kernel_sigmas: float, trim: float | None = None
     ``clutter``; without it all of the reach is, and the predicted bias says what is ``clutter``.
     """
     optics = layout.optics
-    beside = reach(optics.scale_px, optics.blur_px)
+    beside = reach(optics.scale_px, optics.most_blur_px)
     margin = optics.window_px + kernel_sigmas * optics.scale_px + 1
     if trim is None:
         return edge_calipers(layout, beside, margin)

@@ -123,7 +123,8 @@ def _misled(layout: Layout, index: int, caliper: Caliper, strip: tuple[np.ndarra
 
 
 def _prepared(layout: Layout, threshold: float) -> LikelihoodEstimator:
-    clear = CLEARANCE * edge_blur(layout.optics.blur_px)  # a face less than twice as wide has no pixel of its own level
+    # a face less than twice as wide has no pixel of its own level
+    clear = CLEARANCE * edge_blur(layout.optics.most_blur_px)
     seen, calipers, parts = layout.without_slivers(SLIVER), [], []
     for index, caliper in enumerate(edge_calipers(layout, clear, 0.0, 2 * clear)):
         part = None

@@ -54,10 +54,13 @@ class Caliper:
 
     def blur(self, along: np.ndarray) -> np.ndarray | float:
         """Standard deviation of the lens' blur at places along the edge, px."""
+        blur = self.optics.blur_px
+        if self.optics.field is not None:
+            blur = self.optics.blur_at(self.optics.recorded(self.at(np.asarray(along), np.zeros(np.shape(along)))))
         if not self.defocus.any():
-            return self.optics.blur_px
+            return blur
         start, stop = self.defocus
-        return np.sqrt(self.optics.blur_px**2 + (start + (stop - start) * along / self.length) ** 2 / 4)
+        return np.sqrt(blur**2 + (start + (stop - start) * along / self.length) ** 2 / 4)
 
     def curve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The edge as it is recorded at the positions: places (m, 2), px, unit normals (m, 2), and ideal px across the

@@ -9,7 +9,7 @@ from skimage.measure import points_in_poly
 
 from imaging.blurred.arrangement import Arrangement, arrangement_of, faces_beside, polygon_arrangement
 from imaging.features.projected_edges import corner_features, projected_edges, straight
-from imaging.geometry.lens import signed_confusion
+from imaging.geometry.blur import signed_confusion
 from imaging.geometry.projection import depth, facing, project_ideal
 from imaging.geometry.visibility import boundaries
 from imaging.light.appearance import is_plain

@@ -28,7 +28,8 @@ def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> Ri
     outline = limb_outline(curved, pictures.sensors, scene.camera, count)
     seen = limb_look(pictures, curved, outline) if pictures.lights else None
     weight, state = _weights(pictures, curved, outline, seen)
-    width = np.hypot(optics.scale_px, edge_blur(optics.blur_px))
+    blur = optics.blur_at(np.nan_to_num(outline.at) + image_centre(scene.camera))
+    width = np.hypot(optics.scale_px, edge_blur(blur))
     inward = np.nan_to_num(outline.curvature) * width**2 / 2 if seen is None else -seen.shift
     keep = np.flatnonzero(weight > 0) if (weight > 0).any() else np.arange(1)
     normals = np.where(outline.seen[:, None], outline.outward, [1.0, 0.0])

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imaging.colour import by_raw, raw_variance
+from imaging.geometry.blur import blur_times
 from imaging.geometry.lens import lens_jacobian, recorded, undistorted
 from imaging.sensor import headroom
 from imaging.sensor import recorded as expected
 from scenes import Camera, Noise, Scene
+from scenes.cameras.colour import Colour
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,8 @@ class Optics:
     shape : tuple of int
         (height, width), px.
     blur_px : float
-        Standard deviation of the lens' blur, px; the pixels' own box comes on top.
+        Standard deviation of the lens' blur, px; the pixels' own box comes on top. Where it varies over the image, that
+        in its middle.
     noise_variance : float
         Variance of a grey level (in darkness, where it depends on the light).
     scale_px, window_px : float
@@ -32,6 +36,10 @@ class Optics:
         Grey level of darkness.
     camera : Camera, optional
         Whose lens bends straight edges; straight edges are recorded straight when not given.
+    field : Camera, optional
+        Whose blur varies over the image; it is ``blur_px`` everywhere when not given.
+    dimmed : bool
+        Whether its light varies over the image, so that an even background is not recorded as even.
     """
 
     shape: tuple[int, int]
@@ -42,17 +50,31 @@ class Optics:
     noise: Noise | None = None
     camera: Camera | None = None
     dark_level: float = 0.0
+    field: Camera | None = None
+    dimmed: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> Optics:
         """The scene's camera, noise and locator settings."""
         camera, locator, noise = scene.camera, scene.locator, scene.noise
-        uneven = noise if noise.gain > 0 or noise.bits is not None else None
+        uneven = noise if noise.gain > 0 or noise.bits is not None or noise.colour is not None else None
         bent = camera if camera.lens.bends else None
         shape = camera.height, camera.width
         return cls(
-            shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level
-        )
+            shape, camera.blur_px, noise.variance, locator.scale_px, locator.window_px, uneven, bent, noise.dark_level,
+            None if camera.blur_field is None else camera, camera.is_dimmed,
+        )  # fmt: skip
+
+    @property
+    def most_blur_px(self) -> float:
+        """The largest standard deviation of the lens' blur within the image, px."""
+        return self.blur_px if self.field is None else self.blur_px * self.field.blur_field.most
+
+    def blur_at(self, places: np.ndarray) -> np.ndarray | float:
+        """Standard deviation of the lens' blur of what is recorded at places (..., 2), px; one number where even."""
+        if self.field is None:
+            return self.blur_px
+        return self.blur_px * blur_times(self.field, places[..., 0], places[..., 1])
 
     @property
     def sagitta(self) -> float:
@@ -62,6 +84,11 @@ class Optics:
         height, width = self.shape
         border = np.array([[0, 0], [width / 2, 0], [width, 0], [width, height / 2], [width, height]], float)
         return float(np.nan_to_num(np.abs(self.ideal(border) - border), nan=max(self.shape)).max())
+
+    @property
+    def colour(self) -> Colour | None:
+        """The sensor's colour filters."""
+        return None if self.noise is None else self.noise.colour
 
     @property
     def sensor(self) -> Noise:
@@ -75,6 +102,39 @@ class Optics:
         if self.noise.gain == 0 and levels.max() <= headroom(self.noise) + self.noise.dark_level:
             return None
         return expected(self.noise, levels).noise_variance
+
+    def independent(
+        self, rows: np.ndarray, pixels: np.ndarray, levels: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray | float]:
+        """Linear functions of pixels as functions of what has independent noise, and the variance of that.
+
+        Where the noise depends on the light each pixel's variance is taken at the level that it shows: what its own
+        noise does to that averages out over the pixels. Of a colour sensor it is raw pixels that are independent; one
+        beside the pixels counts at the level of those that it is a part of.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (..., P)
+            Derivatives by the pixels.
+        pixels : ndarray of int, shape (P,)
+            Flat indices.
+        levels : ndarray, shape (n, P)
+            Grey levels of n images.
+
+        Returns
+        -------
+        rows : ndarray, shape (..., Q)
+        variance : ndarray, shape (n, Q), or float
+            Grey levels^2.
+        """
+        colour = self.colour
+        if colour is None:
+            variance = self.noise_at(levels)
+            return rows, self.noise_variance if variance is None else variance
+        taken, found = by_raw(colour, pixels, self.shape)
+        used = levels @ taken.multiply(1 / taken.sum(0)[None]).tocsr() if colour.interpolates else levels
+        made = (rows.reshape(-1, rows.shape[-1]) @ taken).reshape(*rows.shape[:-1], len(found))
+        return made, raw_variance(self.noise, used, found, self.shape[1])
 
     def has_room(self, places: np.ndarray) -> np.ndarray:
         """Whether a locator that stands at places (m, 2) looks at the image alone, bool (m,)."""

@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.ndimage import binary_dilation
 
+from imaging.colour import by_raw, raw_variance
 from measure.features.optics import Optics
 
 _DRAWN, _AT_ONCE = 128, 16  # images; both variances are of the same noise: their ratio is known better than each
@@ -85,11 +86,20 @@ def drawn(clean: np.ndarray, pixels: np.ndarray, optics: Optics) -> Iterator[Dra
     optics : Optics
     """
     rng, region = np.random.default_rng(0), _around(pixels, clean.shape)
-    level = clean.ravel()[region]
-    variance = optics.noise_at(level)
-    sigma = np.sqrt(optics.noise_variance if variance is None else variance)
+    from_raw, sigma = _noise_of(clean, region, optics)
     for _ in range(0, _DRAWN, _AT_ONCE):
-        yield Drawn(clean.ravel(), region, sigma * rng.standard_normal((_AT_ONCE, region.size)))
+        noise = sigma * rng.standard_normal((_AT_ONCE, sigma.size))
+        yield Drawn(clean.ravel(), region, noise if from_raw is None else noise @ from_raw.T)
+
+
+def _noise_of(clean: np.ndarray, region: np.ndarray, optics: Optics) -> tuple[sparse.csr_array | None, np.ndarray]:
+    """Standard deviations (Q,) of what is independent, and what makes the pixels (R,) of a region of it, (R, Q)."""
+    level, colour = clean.ravel()[region], optics.colour
+    if colour is None:
+        variance = optics.noise_at(level)
+        return None, np.sqrt(np.full(region.size, optics.noise_variance) if variance is None else variance)
+    taken, raw = by_raw(colour, region, clean.shape)
+    return taken, np.sqrt(raw_variance(optics.noise, clean.ravel()[raw], raw, clean.shape[1]))
 
 
 def _around(pixels: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

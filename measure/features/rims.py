@@ -181,9 +181,8 @@ def _covariance(used: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.
     smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
     inverse = np.where(tool.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
     rows = np.nan_to_num(fit * inverse[:, None]).reshape(-1, fit.shape[-1]) @ tool.response
-    rows = rows.reshape(len(used), fit.shape[1], -1)
-    variance = tool.optics.noise_at(used)
-    variance = tool.optics.noise_variance if variance is None else variance[:, None]
+    rows, variance = tool.optics.independent(rows.reshape(len(used), fit.shape[1], -1), tool.locator.pixels, used)
+    variance = variance if isinstance(variance, float) else variance[:, None]
     return np.einsum("nip,njp->nij", rows * variance, rows)
 
 
@@ -217,7 +216,7 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     design = np.stack([across @ one, across @ two, (across * radial).sum(-1)], -1)
     places, gradient = optics.recorded(ideal), optics.gradient(ideal, normal)
     size = np.linalg.norm(gradient, axis=-1)
-    width = np.hypot(optics.scale_px, edge_blur(optics.blur_px)) * size
+    width = np.hypot(optics.scale_px, edge_blur(optics.blur_at(places))) * size
     inward = -smooth_outline(pictures, circle, ideal - image_centre(scene.camera), normal, width)
     seen = look(pictures, nominal).at(angle) if pictures.lights else None
     if seen is not None:
@@ -273,7 +272,7 @@ def _weights(
         return np.zeros(shown.size), status.NOT_VISIBLE
     if seen is None:
         strong, weight = shown, arc
-        clear = clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.blur_px)
+        clear = clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.most_blur_px)
     else:
         strong = shown & (seen.squared >= MIN_CONTRAST**2 * seen.noise_variance)
         weight, clear = arc * seen.squared / seen.noise_variance, seen.good

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from imaging.features.demosaiced import place_shifts
 from imaging.features.sampling import sampled_places
 from measure.estimators.crossing import CrossingLocator
 from measure.features.optics import Optics
@@ -51,7 +52,8 @@ class Curve:
         It is a sine of the place where the rim runs along their rows or columns.
         """
         there = self.places + (moved / self.gain)[..., None] * self.normals
-        return self.gain * sampled_places(there, self.normals, optics.blur_px, optics.scale_px)
+        mixed = place_shifts(optics.colour, there, self.normals, optics.blur_px, optics.scale_px)
+        return self.gain * (sampled_places(there, self.normals, optics.blur_at(self.places), optics.scale_px) + mixed)
 
 
 @dataclass(frozen=True, eq=False)

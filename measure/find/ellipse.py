@@ -100,7 +100,7 @@ def _found(
     found = gradient_along(optics, angles, places, normals).locate(stack)
     seen = found.valid.mean(1) >= _MIN_FOUND
     # on a curve the zero crossing lies inside the edge by half the curvature times the variance of the smoothed profile
-    inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * curvature(start, angles)
+    inward = (optics.scale_px**2 + edge_blur(optics.blur_at(places)) ** 2) / 2 * curvature(start, angles)
     offset = found.offset + np.minimum(inward, _MOST_INWARD)
     starts, good = _start(places + offset[..., None] * normals, found.valid, start, circle)
     fits: list[EllipseFit | None] = [None] * len(stack)

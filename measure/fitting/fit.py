@@ -12,7 +12,7 @@ from measure.fitting.goodness import p_value, parts
 from measure.fitting.information import are_alone, are_told, covariance_of
 from measure.fitting.likelihood import Problem, most_likely
 from measure.fitting.noise import Curve, by_neighbours, by_repetition, curve
-from measure.fitting.parameters import OPTIONS, Parameters
+from measure.fitting.parameters import Parameters, options_of
 from measure.fitting.photograph import Pixels, Shots, grouped
 from measure.fitting.result import HELD, Fit
 from measure.fitting.sides import flatter_side
@@ -45,7 +45,8 @@ def fit(
 
     Free are the camera's six degrees of freedom (pose, distance, roll, aim), every free light's pose, exposure, level
     of darkness, blur and noise; photographs of several poses share all but the poses. A light's distance is held: it
-    is nearly the same as its brightness.
+    is nearly the same as its brightness. Of a telecentric camera the magnification is free in place of the distance,
+    which changes nothing.
 
     Parameters
     ----------
@@ -58,7 +59,8 @@ def fit(
         Where the search begins, degrees, for all photographs; the scene's settings, whichever is nearest, where not
         given. Some 15 degrees off are found back.
     free : sequence of {"focal", "k1"}
-        What else is free: focal length (told only by a large object nearby), first coefficient of distortion.
+        What else is free: focal length (told only by a large object nearby, and not of a telecentric camera), first
+        coefficient of distortion.
     noise : {"estimated", "given"}
         Whether the noise is estimated too, or the scene's.
 
@@ -72,15 +74,16 @@ def fit(
         If the scene is one of another kind, photographs are not of the camera's size, or there is no pose to begin at.
     """
     check_drawable(scene)
-    if scene.camera.perspective != 1:
-        raise InvalidInput(
-            f"camera.kind must be pinhole for a fit, which tells the distance by the size, got {scene.camera.kind}"
-        )
+    options = options_of(scene.camera)
     for name in free:
-        if name not in OPTIONS:
-            raise InvalidInput(f"free must be some of {', '.join(OPTIONS)}, got {name!r}")
+        if name not in options:
+            raise InvalidInput(f"free must be some of {', '.join(options)}, got {name!r}")
     if noise not in ("estimated", "given"):
         raise InvalidInput(f"noise must be estimated or given, got {noise!r}")
+    if scene.noise.colour is not None:
+        raise InvalidInput(
+            "noise.colour must be left out to fit a scene, whose pixels count alike, got a colour sensor"
+        )
     known = all(image.tone_known for image in images if isinstance(image, Photograph))
     shots = tuple(grouped([image.levels if isinstance(image, Photograph) else image for image in images]))
     _check_size(scene, shots)

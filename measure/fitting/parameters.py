@@ -10,12 +10,13 @@ import numpy as np
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import Frame, camera_frame, project_ideal
 from imaging.pictures import Pictures
-from scenes import Picture, Pose, Scene, mounted
+from scenes import Camera, Picture, Pose, Scene, mounted
 from scenes.numbers import number_at, with_number
 
 Kind = Literal["number", "aim", "sensor", "light"]
 OPTIONS = {"focal": "camera.focal_px", "k1": "camera.lens.distortion[0]"}
 """What may be freed besides, and its key in the scene."""
+_SIZES = {"camera.magnification": 1, "camera.distance": -1}  # the image's size goes with which power of it
 _SHIFT = 2e-3  # px: by so much a step for a derivative moves the image
 _DEGREES = 0.01  # the same step of a light
 _TURN = 45.0  # degrees that a pose may be away from the start
@@ -97,6 +98,12 @@ class Parameters:
         pose = picture.sensor if each.kind == "sensor" else picture.lights[each.where[1]]
         return list(pose)[component]
 
+    def resized(self, values: np.ndarray, times: float) -> np.ndarray:
+        """Values (q,) of which the image is so many times as large."""
+        found, key = values.copy(), size_of(self.scene.camera)
+        found[self.names.index(key)] *= times ** _SIZES[key]
+        return found
+
     def scene_at(self, values: np.ndarray) -> Scene:
         """The scene of values (q,), unchecked."""
         scene, aim = self.scene, np.array(self.scene.camera.look_at)
@@ -143,6 +150,21 @@ class Parameters:
         return Picture(self.scene_at(values), Pose(*sensor.tolist()), tuple(Pose(*at.tolist()) for at in lights))
 
 
+def size_of(camera: Camera) -> str:
+    """Key of the number that tells how large a camera shows what it sees.
+
+    >>> import scenes
+    >>> size_of(scenes.load("task1").camera), size_of(scenes.load("telecentric_plate").camera)
+    ('camera.distance', 'camera.magnification')
+    """
+    return next(key for key in _SIZES if hasattr(camera, key.removeprefix("camera.")))
+
+
+def options_of(camera: Camera) -> tuple[str, ...]:
+    """What of a camera may be freed besides: no focal length where the magnification says all of it."""
+    return tuple(name for name in OPTIONS if name != "focal" or size_of(camera) == "camera.distance")
+
+
 def radius_px(picture: Picture) -> float:
     """Distance of the object's farthest corner from the middle of its image, px."""
     corners = project_ideal(picture.scene.solid.vertices, np.array(list(picture.sensor)), picture.scene.camera)
@@ -155,9 +177,10 @@ def _free(scene: Scene, pictures: tuple[Picture, ...], options: tuple[str, ...])
     part = _SHIFT / size
     pixel = camera.distance / camera.focal_px
     field = max(camera.width, camera.height) * pixel
+    key = size_of(camera)
+    start, unit = number_at(scene, key), scene.units if key == "camera.distance" else ""
     found = [
-        Free("camera.distance", scene.units, "number", (), part * camera.distance, camera.distance / 2,
-             camera.distance * 2, camera.distance / 5),
+        Free(key, unit, "number", (), part * start, start / 2, start * 2, start / 5),
         Free("camera.roll_deg", "deg", "number", (), turn, -_TURN, _TURN, 10.0),
         Free("camera.exposure", "levels", "number", (), 1e-4 * camera.exposure, camera.exposure / 10,
              camera.exposure * 10, camera.exposure / 2),

@@ -133,7 +133,7 @@ def _window(pictures: Pictures) -> tuple[np.ndarray, np.ndarray]:
     corners = corners[np.isfinite(corners).all(1)]
     if not len(corners):
         raise InvalidInput("sensor must see the object, got a pose from which it lies behind")
-    margin, size = _MARGIN + 6 * camera.blur_px, np.array([camera.width, camera.height])
+    margin, size = _MARGIN + 6 * camera.most_blur_px, np.array([camera.width, camera.height])
     low = np.clip(np.floor(corners.min(0) - margin), 0, size - 1).astype(int)
     return low, np.clip(np.ceil(corners.max(0) + margin) + 1, low + 1, size).astype(int)
 
@@ -142,7 +142,7 @@ def _tiles(pictures: Pictures, low, high, most: int) -> tuple[np.ndarray, np.nda
     """Tops and lefts of the squares."""
     across, down = ((high[i] - low[i]) // _TILE for i in (0, 1))
     camera, arrangement = pictures.scene.camera, arrangement_of(pictures)
-    reach = 6 * camera.blur_px + 3
+    reach = 6 * camera.most_blur_px + 3
     y, x = near_pixels(arrangement, (camera.height, camera.width), reach, arrangement.pieces)
     column, row = (x - low[0]) // _TILE, (y - low[1]) // _TILE
     good = (column >= 0) & (column < across) & (row >= 0) & (row < down)

@@ -113,7 +113,7 @@ def _aligned(parameters: Parameters, shots, values: np.ndarray, noise: Noise) ->
             return values
         camera = parameters.scene_at(found).camera
         away = (there[0] - here[0]) * shrink * camera.distance / camera.focal_px
-        found[names.index("camera.distance")] *= np.clip(np.sqrt(here[1] / there[1]), 0.7, 1.4)
+        found = parameters.resized(found, float(np.clip(np.sqrt(there[1] / here[1]), 1 / 1.4, 1 / 0.7)))
         found[names.index("aim.right")] -= away[0]
         found[names.index("aim.down")] -= away[1]
         found[names.index("camera.exposure")] *= np.clip(there[2] / here[2], 0.2, 5.0)

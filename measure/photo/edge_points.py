@@ -58,7 +58,7 @@ def ellipse_by_points(
     if valid.mean() < _FOUND or contrast <= MIN_CONTRAST * np.sqrt(optics.noise_variance):
         return no_ellipse((), status.LOW_CONTRAST)
     # on a curve the zero crossing lies inside the edge by half the curvature times the smoothed profile's variance
-    inward = (optics.scale_px**2 + edge_blur(optics.blur_px) ** 2) / 2 * _curvature(near, normals)
+    inward = (optics.scale_px**2 + edge_blur(optics.blur_at(places)) ** 2) / 2 * _curvature(near, normals)
     points = places + (found.offset[0] + inward)[:, None] * normals
     covariance = _covariance(locator, image, optics, seen) / contrast**2
     return _fitted(points[valid], covariance[np.ix_(valid, valid)], circle)

@@ -107,7 +107,7 @@ def straight_corners(image: np.ndarray, layout: Layout, lens: Intrinsics) -> Str
         If on a side no edge points are found.
     """
     optics = layout.optics
-    clear = reach(optics.scale_px, optics.blur_px)
+    clear = reach(optics.scale_px, optics.most_blur_px)
     calipers = edge_calipers(layout, clear, 0.0)
     lines, blocks, used = [], [], []
     for caliper in calipers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -136,6 +137,9 @@ def _pattern(pictures: Pictures, known: Measurands) -> np.ndarray:
     if known.view.names:
         sides = side_signals(pictures, known.view.names, edge_points(scene.solid, known.view.names, _LOOKED))
         signal = float(np.sqrt(np.nanmean(np.square(sides))))
-    still = Noise(sigma=float(np.hypot(noise.dsnu, noise.prnu * signal)), dark_level=noise.dark_level)
+    dark, bright = (noise.factor(power) for power in (2, 0))
+    still = Noise(
+        sigma=math.sqrt(dark * noise.dsnu**2 + bright * (noise.prnu * signal) ** 2), dark_level=noise.dark_level
+    )
     changed = Pictures(scene.model_copy(update={"noise": still}), pictures.sensors, pictures.lights, pictures.closely)
     return np.sqrt(variance_model("calibrated")(changed).variances_object)

@@ -294,7 +294,7 @@ def _light_part(scene: Scene, names: tuple[str, ...], lights: np.ndarray, model:
         return np.concatenate([1 / mean, smooth], -1)
     cubes = edge_distance2(pictures, names, np.linspace(0, 1, 33)) ** 1.5
     nodes = edge_distance2(pictures, names, _nodes())
-    gain = scene.noise.gain
+    gain = scene.noise.shot_gain
     dark = [np.ptp(cubes, axis=-1)[..., None] ** 2, nodes**3]
     shot = [gain * np.ptp(np.sqrt(cubes), axis=-1)[..., None] ** 2, gain * nodes**1.5] if gain > 0 else []
     return np.concatenate(dark + shot, -1)

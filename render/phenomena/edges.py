@@ -130,7 +130,7 @@ def near_steps(pictures: Pictures, levels: np.ndarray) -> Influence:
 
 def total_variance(scene: Scene) -> float:
     """S^2: of lens, pixel and the locator's smoothing, px^2."""
-    return scene.locator.scale_px**2 + edge_blur(scene.camera.blur_px) ** 2
+    return scene.locator.scale_px**2 + edge_blur(scene.camera.most_blur_px) ** 2
 
 
 def px_per_unit(pictures: Pictures) -> np.ndarray:

@@ -6,8 +6,10 @@ import numpy as np
 
 from imaging.features.locator import edge_blur
 from imaging.features.projected_edges import circles
-from imaging.geometry.lens import confusion, lens_jacobian, recorded
-from imaging.geometry.projection import depth, edge_points, project_ideal
+from imaging.geometry.blur import confusion
+from imaging.geometry.lens import lens_jacobian, recorded
+from imaging.geometry.projection import depth, edge_points, project, project_ideal
+from imaging.light.illumination import illumination
 from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, Effect, Influence, changed, largest
 from render.phenomena.edges import lever, required, sides
@@ -23,10 +25,36 @@ class LensBlur(Effect):
     def influence(self, pictures: Pictures) -> Influence:
         """A point's variance is as (s^2 + s_e^2)^3."""
         scene = pictures.scene
-        own, blur = scene.locator.scale_px**2, edge_blur(scene.camera.blur_px) ** 2
+        own, blur = scene.locator.scale_px**2, edge_blur(scene.camera.most_blur_px) ** 2
         found = sides(pictures)
         moved = np.abs(found.shift(blur)).max(-1)
         return largest((lever(pictures) * moved).sum(-1), np.array([((own + blur) / own) ** 3 - 1]))
+
+
+class RelativeIllumination(Effect):
+    """The lens passes less light beside the image's middle."""
+
+    name = "relative_illumination"
+    switch = "a factor on the supersampled image before it is blurred; costs nothing beside the rays"
+
+    def absent(self, pictures: Pictures) -> str | None:
+        return None if pictures.scene.camera.is_dimmed else "the lens passes light evenly"
+
+    def influence(self, pictures: Pictures) -> Influence:
+        """Contrast changes by the factor, the variance at most by its square; edges move as by shading of its slope."""
+        scene = pictures.scene
+        points = edge_points(scene.solid, required(scene), np.linspace(0, 1, 9)).reshape(-1, 3)
+        at = project(points, pictures.sensors, scene.camera)
+        x, y = at[..., 0], at[..., 1]
+        factor = illumination(scene.camera, x, y)
+        steps = [illumination(scene.camera, x + dx, y + dy) - factor for dx, dy in np.eye(2)]
+        slope = np.hypot(*steps).max(-1) / factor.min(-1)
+        width2 = scene.locator.scale_px**2 + edge_blur(scene.camera.most_blur_px) ** 2
+        bias = lever(pictures).sum(-1) * width2 * slope
+        return largest(bias, np.maximum(factor.min(-1) ** -2.0, factor.max(-1) ** 2) - 1)
+
+    def without(self, scene: Scene) -> Scene:
+        return changed(scene, "camera", relative_illumination=(), natural_vignetting=False)
 
 
 class LensDistortion(Effect):

@@ -9,7 +9,7 @@ import numpy as np
 
 from imaging.pictures import Pictures
 from render.phenomena.base import EFFECTS, EVERYTHING, NOTHING, Effect, EffectTolerance, Influence
-from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion
+from render.phenomena.lens import DepthOfField, LensBlur, LensDistortion, RelativeIllumination
 from render.phenomena.pose import PoseJitter
 from render.phenomena.sensor import FixedPattern, Quantisation, ReadNoise, Saturation, ShotNoise
 from render.phenomena.shading import (
@@ -28,10 +28,11 @@ from render.phenomena.transport import CastShadow, FloorReflectance, Interreflec
 from scenes import InvalidInput, Picture, Scene
 from scenes.errors import given
 
+DIMMED = RelativeIllumination()
 for _effect in (
     AttachedShadow(), CastShadow(), Interreflection(), FloorReflectance(), SpecularLobe(), Polarisation(),
     Analyser(), Wavelength(), Texture(), FallOff(), LightSize(), BacklightShown(), Spill(), DepthOfField(),
-    LensBlur(), LensDistortion(), ShotNoise(), ReadNoise(),
+    LensBlur(), LensDistortion(), DIMMED, ShotNoise(), ReadNoise(),
     FixedPattern(), Quantisation(), Saturation(), PoseJitter(),
 ):  # fmt: skip
     EFFECTS.add(_effect.name)(_effect)

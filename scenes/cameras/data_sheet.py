@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
+from pydantic import ValidationError
+
+from scenes.cameras.blur_field import BlurField
 from scenes.cameras.kinds import CAMERAS
+from scenes.cameras.pinhole import Camera
 from scenes.cameras.pinhole import is_positive as _number
 from scenes.units import Unit, in_unit
 
@@ -45,9 +49,39 @@ def completed(camera: dict[str, Any], unit: Unit) -> dict[str, Any]:
     kind = camera.get("kind", "pinhole")
     if not isinstance(kind, str) or kind not in CAMERAS:
         return camera
-    for key, (value, source) in CAMERAS[kind].derived(camera, unit, pitch).items():
+    for key, (value, source) in derived(CAMERAS[kind], camera, unit, pitch).items():
         camera = _said(camera, key, value, source)
     return camera
+
+
+def derived(
+    kind: type[Camera], camera: dict[str, Any], unit: Unit, pitch_um: float | None
+) -> dict[str, tuple[float, str]]:
+    """What follows from a camera's table, of a kind: values by their keys, and from which key; of any kind the blur.
+
+    Raises
+    ------
+    ValueError
+        If it does not fit together, or is not enough.
+    """
+    found = kind.derived(camera, unit, pitch_um)
+    blur_um = _middle_um(camera)
+    if blur_um is None:
+        return found
+    if pitch_um is None:
+        raise ValueError("camera.pixel_pitch_um must be given with blur_field.mtf, got nothing")
+    return {**found, "blur_px": (blur_um / pitch_um, "blur_field.mtf")}
+
+
+def _middle_um(camera: dict[str, Any]) -> float | None:
+    """The blur in the image's middle that the modulation transfer of a field says, um; what is none is said later."""
+    field = camera.get("blur_field")
+    if isinstance(field, dict) and field.get("mtf"):
+        try:
+            field = BlurField.model_validate(field)
+        except ValidationError:
+            return None
+    return field.middle_um() if isinstance(field, BlurField) else None
 
 
 def not_derived(camera: dict[str, Any], given: Collection[str]) -> dict[str, Any]:
@@ -59,6 +93,9 @@ def not_derived(camera: dict[str, Any], given: Collection[str]) -> dict[str, Any
             follows |= set(derived)
     if "working_distance_mm" in given and camera["working_distance_mm"] is not None:
         follows.add("distance")
+    field = camera.get("blur_field")
+    if field.get("mtf") if isinstance(field, dict) else isinstance(field, BlurField) and field.mtf:
+        follows.add("blur_px")
     if camera.get("sensor_size_mm") is not None and {"sensor_size_mm", "pixel_pitch_um"} & set(given):
         follows |= {"width", "height"}
     return {key: value for key, value in camera.items() if key in given or key not in follows}

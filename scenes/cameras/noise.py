@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from scenes.cameras.colour import Colour
 from scenes.model import Model
 from scenes.ranges import Darkness, NotNegative, Trace
 
@@ -27,8 +28,22 @@ class Noise(Model):
     """Standard deviation of the fixed pattern in darkness [grey levels]."""
     pattern_seed: Annotated[int, Field(ge=0)] = 0
     """Which camera: the fixed pattern is the same in all its pictures."""
+    colour: Colour | None = None
+    """Colour filters on the pixels, whose raw noise all other keys then tell; left out: a monochrome sensor."""
 
     @property
     def variance(self) -> float:
-        """Variance of a grey level in darkness, rounding included (1/12 of a squared grey level)."""
-        return self.sigma**2 + (0.0 if self.bits is None else 1 / 12)
+        """Variance of a grey level in darkness, rounding included (1/12 of a squared grey level).
+
+        With colour filters that of white noise which moves an edge as much (`Colour.noise_factor`).
+        """
+        return self.factor(2) * (self.sigma**2 + (0.0 if self.bits is None else 1 / 12))
+
+    @property
+    def shot_gain(self) -> float:
+        """Variance that the light's own noise adds over the signal, of the same white noise [grey levels]."""
+        return self.factor(1) * self.gain
+
+    def factor(self, power: int) -> float:
+        """`Colour.noise_factor`; 1 of a monochrome sensor."""
+        return 1.0 if self.colour is None else self.colour.noise_factor(power)

@@ -7,13 +7,16 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from scenes.cameras.blur_field import BlurField
 from scenes.cameras.kinds import CAMERAS
 from scenes.cameras.lens import Lens
 from scenes.cameras.lens_model import AnyLens
+from scenes.cameras.over_field import outward
 from scenes.model import Model
-from scenes.ranges import Coordinate, Curve, Length, Level, Positive, rising
+from scenes.ranges import Coordinate, Curve, Fraction, Length, Level, Positive, rising
 from scenes.units import Unit, in_unit
 
+Illumination = Annotated[tuple[tuple[Fraction, Annotated[float, Field(gt=0, le=1.5)]], ...], Field(max_length=64)]
 MOST_PIXELS = 40_000_000  # 320 MB as float64
 
 
@@ -39,7 +42,14 @@ class Camera(Model):
     distance: Length
     """From ``look_at`` [length]."""
     blur_px: Annotated[float, Field(ge=0, le=100)] = 0.6
-    """Standard deviation of the lens' Gaussian blur [px]."""
+    """Standard deviation of the lens' Gaussian blur; where ``blur_field`` is given, that in the image's middle [px]."""
+    blur_field: BlurField | None = None
+    """How the blur varies over the image; even where not given."""
+    relative_illumination: Illumination = ()
+    """Light that the lens passes over that in the image's middle: rows [image height, ratio], 0 the image's middle and
+    1 its corner; even where not given [ratio]."""
+    natural_vignetting: bool = False
+    """Whether light falls by the fourth power of the cosine of the angle from the axis, besides."""
     exposure: Level = 200.0
     """What the light adds to darkness on a white diffuse surface at ``look_at`` that faces it [grey levels]."""
     look_at: tuple[Coordinate, Coordinate, Coordinate] = (0.0, 0.0, 0.0)
@@ -102,6 +112,16 @@ class Camera(Model):
         return {"focal_px": (focal * away / (away - focal) / pitch_um * 1000, "focal_length_mm")}
 
     @property
+    def most_blur_px(self) -> float:
+        """The largest standard deviation of the lens' blur within the image, in focus, px."""
+        return self.blur_px if self.blur_field is None else self.blur_px * self.blur_field.most
+
+    @property
+    def is_dimmed(self) -> bool:
+        """Whether it passes less light aside of the image's middle, or more."""
+        return bool(self.relative_illumination) or self.natural_vignetting
+
+    @property
     def perspective(self) -> float:
         """Share of perspective: 1 where all rays go through one point, 0 where they are parallel."""
         return 1.0
@@ -123,6 +143,11 @@ class Camera(Model):
     def moved_to(self, distance: float) -> Self:
         """The same camera elsewhere on its axis, its lens set as before; unchecked."""
         return self.tried(distance=distance)
+
+    @field_validator("relative_illumination")
+    @classmethod
+    def _outward(cls, rows: Any) -> Any:
+        return outward("camera.relative_illumination", rows)
 
     @field_validator("transmission", "responsivity")
     @classmethod

@@ -54,6 +54,15 @@ class Telecentric(Camera):
     )  # fmt: skip
 
     @model_validator(mode="after")
+    def _along_the_axis(self) -> Telecentric:
+        if self.natural_vignetting:
+            raise ValueError(
+                "camera.natural_vignetting must be left out of a telecentric camera, whose rays run along the axis, got"
+                " true"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _one_aperture(self) -> Telecentric:
         if self.lens.aperture_radius:
             raise ValueError(

@@ -12,6 +12,7 @@ from tests.proofs.conditions import conditions
 from tests.proofs.corpus import corpus
 from tests.proofs.crowded import crowded
 from tests.proofs.emva import emva
+from tests.proofs.field_blur import field_blur
 from tests.proofs.fits import fits
 from tests.proofs.form import form
 from tests.proofs.form_poses import form_poses
@@ -45,6 +46,7 @@ app.command()(conditions)
 app.command()(corpus)
 app.command()(crowded)
 app.command()(emva)
+app.command()(field_blur)
 app.command()(fits)
 app.command()(form)
 app.command()(form_poses)

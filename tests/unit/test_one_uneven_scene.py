@@ -12,7 +12,8 @@ import measure
 import planner
 import render
 import scenes
-from imaging.geometry.lens import blur_at, recorded, undistorted
+from imaging.geometry.blur import blur_at
+from imaging.geometry.lens import recorded, undistorted
 from imaging.geometry.projection import edge_points, project
 from imaging.light.appearance import edge_contrast, side_signals
 from imaging.pictures import Pictures
@@ -228,7 +229,8 @@ def test_defocus_is_that_of_each_edge_s_depth(scene):
     lens, camera = scene.camera.lens, scene.camera
     for depth in (101.0, 110.0, 118.0):
         radius = lens.aperture_radius * abs(depth - lens.focus) / depth * camera.focal_px / lens.focus
-        assert float(blur_at(camera, np.array(depth))) == pytest.approx(math.hypot(0.7, radius / 2), rel=1e-12)
+        found = float(blur_at(camera, np.array(depth), np.zeros(2)))
+        assert found == pytest.approx(math.hypot(0.7, radius / 2), rel=1e-12)
 
 
 def test_a_render_reaches_as_far_as_the_corner_that_is_least_in_focus(scene, picture):

@@ -13,7 +13,7 @@ import planner
 import render
 import scenes
 from imaging.contours.limb import limb
-from imaging.geometry.lens import signed_confusion
+from imaging.geometry.blur import signed_confusion
 from imaging.geometry.projection import (
     depth,
     facing,

@@ -79,13 +79,18 @@ class Options:
     channel: recorded.Channel = None
     bayer: recorded.Bayer = None
     mtf: recorded.Mtf = None
+    blur_field: recorded.Field = None
     as_json: Json = False
 
     @property
     def of_photographs(self) -> dict[str, Any]:
         """What is asked of a photograph without a scene alone, by option; None where it is not."""
-        names = ("near", "box", "corners", "kind", "most", "output", "all", "gamma", "channel", "bayer", "mtf")
-        return {f"--{name}": self.every or None if name == "all" else getattr(self, name) for name in names}
+        names = ("near", "box", "corners", "kind", "most", "output", "all", "gamma", "channel", "bayer", "mtf",
+                 "blur_field")  # fmt: skip
+        return {
+            f"--{name.replace('_', '-')}": self.every or None if name == "all" else getattr(self, name)
+            for name in names
+        }
 
     @property
     def of_scenes(self) -> dict[str, Any]:
@@ -110,6 +115,7 @@ def measure_command(given: Options) -> None:
     check_file("--output", given.output, ".png", ".pdf", ".svg")
     check_directory("--inspection", given.inspection)
     check_file("--mtf", given.mtf, ".png")
+    check_file("--blur-field", given.blur_field, ".toml")
     if given.scene is None:
         _measure_photograph(given)
     _measure_scene(given)
@@ -212,8 +218,9 @@ def _shapes_wanted(given: Options) -> dict[str, Any]:
         "kinds": None if given.kind is None else tuple(given.kind.split(",")),
         "most": _ALL if given.every else _MOST if given.most is None else given.most,
     }
-    if given.mtf is not None:
-        recorded.check_mtf(wanted["kinds"])
+    for option, file in (("--mtf", given.mtf), ("--blur-field", given.blur_field)):
+        if file is not None:
+            recorded.check_sides(wanted["kinds"], option)
     return wanted
 
 
@@ -242,16 +249,19 @@ def _say_measurands(given: Options, inspected: Inspection, distance: measure.Mea
 def _say_shapes(given: Options, photo: Photograph, found: measure.Shapes) -> NoReturn:
     """The shapes of a photograph, drawn if wanted; exit status 1 where nothing could be measured."""
     sharp = recorded.sharpness(photo, found, given.mtf) if given.mtf is not None else {}
+    field = recorded.field(photo, found, given.blur_field) if given.blur_field is not None else None
+    told = {} if field is None else recorded.field_facts(field)
     if given.output is not None:
         from validation.report import overlay
 
         overlay.write(given.output, photo.levels, found)
     if given.as_json:
-        say({"file": str(given.file), **recorded.facts(photo), **photograph.facts(found), **sharp}, True, "")
+        say({"file": str(given.file), **recorded.facts(photo), **photograph.facts(found), **sharp, **told}, True, "")
     else:
         if found.candidates:
             console().print(photograph.table(found), highlight=False)
         lines = [recorded.text(photo), photograph.text(found), *recorded.sharpness_lines(sharp)]
+        lines += [] if field is None else recorded.field_lines(field)
         say({}, False, "\n".join(lines))
     good = any(one.measured for one in found.found) and sharp.get("mtf") != []
     raise typer.Exit(0 if good else 1)

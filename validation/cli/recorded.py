@@ -25,6 +25,10 @@ Bayer = Annotated[
     str | None, typer.Option(metavar="RGGB|...", help="The photograph is a raw mosaic: its first pixels.")
 ]
 _WITH_SIDES = ("quadrilateral", "tag")
+Field = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.toml", help="Write how the blur varies over the field, as a scene's [camera] says it."),
+]
 Mtf = Annotated[Path | None, typer.Option(metavar="PNG", help="Draw edge spread and modulation transfer of each side.")]
 
 
@@ -63,7 +67,7 @@ def of_sides_lines(found: measure.Quadrilateral) -> list[str]:
     return lines
 
 
-def check_mtf(kinds: tuple[str, ...] | None) -> None:
+def check_sides(kinds: tuple[str, ...] | None, option: str) -> None:
     """See that kinds of shapes that are sought, all if None, have sides.
 
     Raises
@@ -72,7 +76,7 @@ def check_mtf(kinds: tuple[str, ...] | None) -> None:
         If none has.
     """
     if kinds is not None and not {*kinds} & {*_WITH_SIDES}:
-        raise InvalidInput(f"--kind must hold {' or '.join(_WITH_SIDES)} with --mtf, got {','.join(kinds)}")
+        raise InvalidInput(f"--kind must hold {' or '.join(_WITH_SIDES)} with {option}, got {','.join(kinds)}")
 
 
 def sharpness(photo: Photograph, found: measure.Shapes, plot: Path) -> dict[str, Any]:
@@ -101,6 +105,51 @@ def sharpness(photo: Photograph, found: measure.Shapes, plot: Path) -> dict[str,
         for side, one in sides
     ]  # fmt: skip
     return {"mtf": told + refused}
+
+
+def field(photo: Photograph, found: measure.Shapes, file: Path) -> measure.FittedField:
+    """How the blur varies over the field, from all sides of what was measured; written to ``file``.
+
+    Raises
+    ------
+    InvalidInput
+        If the sides do not tell it, or the file cannot be written.
+    """
+    from measure import blurred_sides, fitted_field
+
+    polygons = [one.corners for one in found.found if one.quadrilateral is not None and one.corners is not None]
+    told = fitted_field(blurred_sides(photo, polygons), photo.levels.shape)
+    try:
+        file.write_text("\n".join([*told.lines(), ""]), encoding="utf-8")
+    except OSError as error:
+        raise InvalidInput(f"--blur-field must be a writable file, got {file} ({error.strerror})") from None
+    return told
+
+
+def field_facts(told: measure.FittedField) -> dict[str, Any]:
+    """What it says."""
+    table = [[height, times] for height, times in told.field.table]
+    sides = zip(told.sides.ends.mean(1).tolist(), told.sides.sigma.tolist(), told.sides.error.tolist(),
+                told.residual.tolist(), strict=True)  # fmt: skip
+    return {"blur_field": {
+        "blur_px": told.blur_px, "table": table, "sd": told.sd.tolist(), "covariance": told.covariance.tolist(),
+        "p_value": told.p_value,
+        "sides": [{"place": place, "blur_px": blur, "error": error, "residual": away}
+                  for place, blur, error, away in sides],
+    }}  # fmt: skip
+
+
+def field_lines(told: measure.FittedField) -> list[str]:
+    """The same in words."""
+    sd, rows = told.sd, told.field.table
+    outward = ", ".join(
+        f"{times:.3f} +- {each:.3f} times that at {height:.2f}"
+        for (height, times), each in zip(rows, sd[1:], strict=True)
+    )
+    return [
+        f"blur over the field, of {told.sides.sigma.size} sides: {told.blur_px:.3f} +- {sd[0]:.3f} px in the middle,"
+        f" {outward} of the half diagonal; chi-square probability {told.p_value:.2g}"
+    ]
 
 
 def sharpness_lines(told: dict[str, Any]) -> list[str]:

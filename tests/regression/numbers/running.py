@@ -601,7 +601,10 @@ def _photograph():
                 replace(one.quadrilateral, curve=grown, side_blur_px=np.array([1.0, np.nan, 1.0, 1.0])),
             )
         ],
-        "kinds": [refused(partial(recorded.check_mtf, kinds)) for kinds in (None, ("tag",), ("ellipse", "chessboard"))],
+        "kinds": [
+            refused(partial(recorded.check_sides, kinds, "--mtf"))
+            for kinds in (None, ("tag",), ("ellipse", "chessboard"))
+        ],
         "facts": photograph.facts(found) if hasattr(photograph, "facts") else None,
     }
 
