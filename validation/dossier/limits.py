@@ -11,11 +11,11 @@ LIMITS = (
      "anisotropy, no stains.", "state how exactly the reflectance is known (`uncertainty.reflectance`)"),
     ("Light", "The lamps of the scene, and light between its surfaces. Light of the room and of things that the scene "
      "does not have is missing.", "shield the station, or add them to the scene"),
-    ("Lens", "The distortion that the scene's model has; its uncertainty is that of the model's numbers. Brightness "
-     "that falls towards the corners, and blur that differs over the field, are missing.",
+    ("Lens", "Distortion, fall of brightness and blur over the field are those that the scene states; what it does not "
+     "state is missing, and the uncertainty of the distortion is that of its model's numbers.",
      "calibrate with the board where the part is (`ice calibrate-camera`)"),
     ("Noise", "EMVA 1288's linear model: dark noise, shot noise, fixed pattern, rounding, independent from pixel to "
-     "pixel and the same in every row and column.",
+     "pixel until a colour mosaic is filled in, and the same in every row and column.",
      "photographs whose noise is correlated get the status `correlated`; estimate the noise of your own camera"),
     ("Motion and time", "Everything stands still during the exposure; nothing drifts between pictures but what the "
      "scene states.", "expose shortly; state drifts as uncertainties of distance, pose and temperature"),
