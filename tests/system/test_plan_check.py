@@ -22,19 +22,19 @@ IMAGES = 400
 
 @pytest.fixture(scope="module")
 def bracket():
-    """The bracket's plan with the light held: its surfaces light each other, which no formula knows."""
+    """The bracket's plan with the light held: its surfaces light each other, which its close look knows."""
     plan = planner.plan(scenes.load("bracket"), light=(30, 0), step_deg=20)
     return plan, check_plan(plan, 5, ROUGH)
 
 
 @pytest.mark.render
-def test_another_order_where_surfaces_light_each_other(bracket):
+def test_the_order_is_the_plans_where_surfaces_light_each_other(bracket):
     plan, found = bracket
     assert (found.settings[0].sensor, found.settings[0].light) == plan.poses
     assert len({row.sensor for row in found.settings}) == len(found.settings) == 5
     assert [row.rank_before for row in found.settings] == [1, 2, 3, 4, 5]
-    assert found.order_changed
-    assert found.proposed.rank_after == 1
+    assert not found.order_changed
+    assert [row.rank_after for row in found.settings] == [1, 2, 3, 4, 5]
     assert {row.status for row in found.settings} == {"ok"}  # what light between the surfaces does is taken off
     assert all(row.propagated < row.with_bias < 2 * row.propagated for row in found.settings)
     assert found.without_formula == ("interreflection",)
@@ -51,14 +51,11 @@ def scattered(plan, row) -> np.ndarray:
 
 
 @pytest.mark.render
-def test_noisy_pictures_bear_the_new_order_out(bracket):
-    """Of the pair whose order turns most, 400 noisy pictures each: the F-test refuses the plan's order at 0.1 %."""
+def test_noisy_pictures_bear_the_order_out(bracket):
+    """Of the best and the worst, 400 noisy pictures each: the F-test refuses the other order at 0.1 %."""
     plan, found = bracket
-    rows = [row for row in found.settings if row.rank_after]
-    pairs = [(a, b) for a in rows for b in rows if a.rank_before < b.rank_before]
-    worse, better = max(pairs, key=lambda pair: pair[0].propagated / pair[1].propagated)
-    first, second = scattered(plan, worse), scattered(plan, better)
-    assert worse.calibrated < better.calibrated
+    best, *_, worst = found.settings
+    first, second = scattered(plan, worst), scattered(plan, best)
     assert stats.f.sf(first.var(ddof=1) / second.var(ddof=1), first.size - 1, second.size - 1) < 1e-3
 
 

@@ -18,6 +18,7 @@ import planner
 import render
 import scenes
 import validation
+from imaging.geometry import blur as blurs
 from imaging.geometry import lens as lenses
 from imaging.geometry.visibility import seen
 from scenes import InvalidInput, Lens, Picture
@@ -202,11 +203,11 @@ def test_defocus_by_marginal_rays(task1, depth):
     rim, point = np.array([radius, 0.0]), np.array([0.0, depth])
     met = rim + (point - rim) * (focus - rim[1]) / (point[1] - rim[1])
     on_image = -met[0] / focus * camera.focal_px  # on the other side of the axis behind the focus
-    assert lenses.signed_confusion(camera, np.array(depth)) == pytest.approx(on_image, rel=1e-12, abs=1e-9)
+    assert blurs.signed_confusion(camera, np.array(depth)) == pytest.approx(on_image, rel=1e-12, abs=1e-9)
     turn, reach = np.random.default_rng(2).uniform(0, 1, (2, 200_000))
     disc = abs(on_image) * np.sqrt(reach) * np.cos(2 * np.pi * turn)
     blur = np.sqrt(disc.var() + camera.blur_px**2)
-    assert float(lenses.blur_at(camera, np.array(depth))) == pytest.approx(blur, rel=8e-3)
+    assert float(blurs.blur_at(camera, np.array(depth), lenses.image_centre(camera))) == pytest.approx(blur, rel=8e-3)
 
 
 def test_one_flat_corner_is_ill_conditioned(task1):

@@ -452,7 +452,7 @@ def test_an_ellipse_is_fitted_in_the_smallest_window_that_holds_its_band(middle)
     """Turned and of unequal axes, within the image: as far as its outline reaches, and the band beside that."""
     matrix, (width, height) = np.array([[14.0, 3.0], [3.0, 8.0]]), (61, 47)
     shape = np.array([*middle, 14.0, 8.0, 3.0])
-    optics = SimpleNamespace(shape=(height, width), blur_px=0.5)
+    optics = SimpleNamespace(shape=(height, width), blur_px=0.5, most_blur_px=0.5)
     seen = SimpleNamespace(near=lambda angle: np.ones(angle.shape, bool))
     columns, rows, near = ellipse._near(shape, optics, seen)
     turn = np.linspace(0, 2 * np.pi, 20001)
