@@ -17,8 +17,9 @@ LIMITS = (
     ("Noise", "EMVA 1288's linear model: dark noise, shot noise, fixed pattern, rounding, independent from pixel to "
      "pixel until a colour mosaic is filled in, and the same in every row and column.",
      "photographs whose noise is correlated get the status `correlated`; estimate the noise of your own camera"),
-    ("Motion and time", "A part that moves is sheared by a rolling shutter as the scene states, and not smeared; nothing "
-     "drifts between pictures but what the scene states.", "expose shortly; state drifts as uncertainties of distance, pose and temperature"),
+    ("Motion and time", "A part that moves is sheared by a rolling shutter as the scene states, and not smeared; "
+     "nothing drifts between pictures but what the scene states.",
+     "expose shortly; state drifts as uncertainties of distance, pose and temperature"),
     ("The budget's model", "A tilt of the part is not followed into its brightness, errors of place not into the "
      "locators' bias, a turn of a circle about its centre is of first order.",
      "`ice budget SCENE --stations N` tells of plain scenes what that leaves out"),
