@@ -171,8 +171,8 @@ def test_a_limbs_places_near_an_edge_that_is_seen(monkeypatch):
     solid = SimpleNamespace(
         rims=(), lines=(SimpleNamespace(ends=(1, 0)),), vertices=np.array([[-1.0, 0, 7], [6.0, 0, 7]])
     )
-    scene = SimpleNamespace(solid=solid, bodies=SimpleNamespace(is_convex=False),
-                            camera=SimpleNamespace(most_blur_px=1.0), locator=SimpleNamespace(scale_px=1.0))  # fmt: skip
+    camera, locator = SimpleNamespace(most_blur_px=1.0), SimpleNamespace(scale_px=1.0)
+    scene = SimpleNamespace(solid=solid, bodies=SimpleNamespace(is_convex=False), camera=camera, locator=locator)
     eyes = Viewpoint(np.array([[0, 0, 90.0], [0, 0, 80.0]]))
     pictures = SimpleNamespace(scene=scene, viewpoint=eyes, sensors=np.zeros((2, 2)))
     outline = SimpleNamespace(at=at, arc=np.array([1.0, 2.0, np.nan, 3.0]))
