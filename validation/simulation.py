@@ -187,20 +187,21 @@ def _sure(
 
 def _more(picture: Picture, images: Images, how: How) -> list[Callable[[], Images]]:
     """What tells of inputs that these images do not know well enough, the quickest first."""
-    overall = cache(partial(_overall, picture, how))
+    overall = cache(partial(_overall, picture, images, how))
     return [
         lambda: replace(images, overall=overall()),
         lambda: replace(_settled(picture, images, how), overall=overall()),
     ]
 
 
-def _overall(picture: Picture, how: How) -> np.ndarray:
-    """Images of all of a picture, as `measure.Images` has them."""
+def _overall(picture: Picture, images: Images, how: How) -> np.ndarray:
+    """Images of all of a picture, as `measure.Images` has them, with what others of it have changed."""
     how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
+    changed = *_of_other_surfaces(picture), *(_with_lights_moved(picture) if LIGHT in images.changed else ())
     for seed in range(2):
         alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
         levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
-        sets.append([levels.image(picture, seed), *map(alike.image, (picture, *_changed_pictures(picture, how)))])
+        sets.append([levels.image(picture, seed), *map(alike.image, (picture, *changed))])
     return np.array(sets)
 
 
@@ -339,13 +340,6 @@ def _completed(
         made = whole if _is_below(picture, LARGE) else direct
         changed[LIGHT] = _steps(first, made, _with_lights_moved(picture), picture)
     return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
-
-
-def _changed_pictures(picture: Picture, how: How) -> Iterator[Picture]:
-    """With each input changed, in the order of `_completed`'s images."""
-    yield from _of_other_surfaces(picture)
-    if _light_in_closed_form(picture, how) is None:
-        yield from _with_lights_moved(picture)
 
 
 def _is_below(picture: Picture, pixels: int) -> bool:

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from imaging.features.locator import edge_blur
+from imaging.features.sampling import crossing_gain, frequencies, line_through
 from scenes.cameras.colour import COLOURS, Colour
 
 _ORDERS = np.array([[0.5, 0.0], [0.0, 0.5], [0.5, 0.5], [0.5, -0.5]])  # in periods of the pixels
@@ -42,10 +42,7 @@ def line_shift(
         return np.zeros(np.shape(length)), np.zeros(np.shape(length))
     normal = np.stack([-tangent[..., 1], tangent[..., 0]], -1)
     sine, cosine = _waves(colour, middle, normal, blur_px, scale)
-    x = np.pi * length[..., None] * (tangent @ _ORDERS.T)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        lever = np.where(np.abs(x) < 1e-3, x / 3, (np.sin(x) - x * np.cos(x)) / x**2)
-    return (sine * np.sinc(x / np.pi)).sum(-1), (cosine * lever).sum(-1) * 6 / length
+    return line_through(sine, cosine, tangent @ _ORDERS.T, length)
 
 
 def place_shifts(
@@ -77,14 +74,12 @@ def _amplitudes(colour: Colour, blur_px: float, scale: float) -> np.ndarray:
 
     As of `imaging.features.sampling`, with the interpolation's own spectrum at the moved frequency.
     """
-    spacing = 0.2 / max(scale, 1.0)
-    w = spacing * (np.arange(int((2 * np.pi + 8 / scale) / spacing)) + 0.5)
-    w = np.concatenate([-w[::-1], w])
+    w, spacing = frequencies(scale)
     lens = max(blur_px**2 - colour.blur_px**2, 0.0)
     normal = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], -1)
     box = np.sinc(w[:, None, None] * normal / (2 * np.pi)).prod(-1)
     step = np.exp(-lens * w[:, None] ** 2 / 2) * box / w[:, None]
-    lone = np.sqrt(2 * np.pi) * np.hypot(scale, edge_blur(blur_px)) ** 3
+    lone = crossing_gain(blur_px, scale)
     found = np.zeros((len(COLOURS), len(_ORDERS), len(_ANGLES)))
     for number, order in enumerate(_ORDERS):
         k = w[:, None, None] * normal + 2 * np.pi * order

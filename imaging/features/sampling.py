@@ -36,13 +36,25 @@ def sampled_line(middle, tangent, length, blur_px, scale: float) -> tuple[np.nda
         Of the locator, px.
     """
     phase = 2 * np.pi * middle @ _ORDERS.T
-    x = np.pi * length[..., None] * (tangent @ _ORDERS.T)
     normal = np.stack([-tangent[..., 1], tangent[..., 0]], -1)
     amplitude = _amplitude(normal @ _ORDERS.T, blur_px, scale)
+    return line_through(amplitude * np.sin(phase), amplitude * np.cos(phase), tangent @ _ORDERS.T, length)
+
+
+def line_through(sine, cosine, periods, length) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and slope of the line through shifts along a length (...), px, that are sums of m waves.
+
+    Parameters
+    ----------
+    sine, cosine : ndarray, shape (..., m)
+        Of each wave in the length's middle, times its amplitude, px.
+    periods : ndarray, shape (..., m)
+        Of each wave along the length, 1 / px.
+    """
+    x = np.pi * length[..., None] * periods
     with np.errstate(divide="ignore", invalid="ignore"):
         lever = np.where(np.abs(x) < 1e-3, x / 3, (np.sin(x) - x * np.cos(x)) / x**2)
-    mean = (amplitude * np.sin(phase) * np.sinc(x / np.pi)).sum(-1)
-    return mean, (amplitude * np.cos(phase) * lever).sum(-1) * 6 / length
+    return (sine * np.sinc(x / np.pi)).sum(-1), (cosine * lever).sum(-1) * 6 / length
 
 
 def sampled_places(places: np.ndarray, normals: np.ndarray, blur_px, scale: float) -> np.ndarray:
@@ -72,13 +84,22 @@ def _amplitudes(blur_px: float, scale: float) -> np.ndarray:
     The step's spectrum is 1 / (i w) times that of the lens' blur and of the pixel's box; the locator's, at
     k = w n + 2 pi m, is -(k . n)^2 exp(-s^2 k^2 / 2). The pole at w = 0 is left out evenly on both sides.
     """
-    spacing = 0.2 / max(scale, 1.0)
-    w = spacing * (np.arange(int((2 * np.pi + 8 / scale) / spacing)) + 0.5)
-    w = np.concatenate([-w[::-1], w])
+    w, spacing = frequencies(scale)
     cosine = _TABLE[:, None]
     box = np.sinc(w * cosine / (2 * np.pi)) * np.sinc(w * np.sqrt(1 - cosine**2) / (2 * np.pi))
     k2 = w**2 + 4 * np.pi * w * cosine + 4 * np.pi**2
     kernel = (w + 2 * np.pi * cosine) ** 2 * np.exp(-(scale**2) * k2 / 2)
     total = -(np.exp(-((blur_px * w) ** 2) / 2) * box * kernel / w).sum(-1) * spacing / (2 * np.pi)
-    lone = np.sqrt(2 * np.pi) * np.hypot(scale, edge_blur(blur_px)) ** 3
-    return 2 * total * lone
+    return 2 * total * crossing_gain(blur_px, scale)
+
+
+def frequencies(scale: float) -> tuple[np.ndarray, float]:
+    """Where an edge's spectrum is summed, evenly on both sides of 0, and their spacing, rad / px."""
+    spacing = 0.2 / max(scale, 1.0)
+    w = spacing * (np.arange(int((2 * np.pi + 8 / scale) / spacing)) + 0.5)
+    return np.concatenate([-w[::-1], w]), spacing
+
+
+def crossing_gain(blur_px: float, scale: float) -> float:
+    """By how much a unit step's crossing moves for a second derivative that is added to its smoothed image, px^3."""
+    return np.sqrt(2 * np.pi) * np.hypot(scale, edge_blur(blur_px)) ** 3

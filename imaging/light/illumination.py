@@ -29,11 +29,12 @@ def illumination(camera: Camera, x: Any, y: Any, ops: Ops = NUMPY) -> Any:
 def fall(camera: Camera, place: np.ndarray) -> np.ndarray:
     """Gradient of its logarithm at recorded places (..., 2), 1 / px: how even things change a px."""
 
-    def at(places: np.ndarray) -> np.ndarray:
-        return illumination(camera, places[..., 0], places[..., 1])
+    found = [_at(camera, place + step) - _at(camera, place - step) for step in _STEP * np.eye(2)]
+    return np.stack(found, -1) / (2 * _STEP * _at(camera, place))[..., None]
 
-    found = [at(place + step) - at(place - step) for step in _STEP * np.eye(2)]
-    return np.stack(found, -1) / (2 * _STEP * at(place))[..., None]
+
+def _at(camera: Camera, place: np.ndarray) -> np.ndarray:
+    return illumination(camera, place[..., 0], place[..., 1])
 
 
 def dimming(pictures: Pictures, points: np.ndarray, axes: int) -> np.ndarray | float:
@@ -49,7 +50,7 @@ def dimming(pictures: Pictures, points: np.ndarray, axes: int) -> np.ndarray | f
         return 1.0
     poses = sensors.reshape(*sensors.shape[:-1], *(1,) * max(axes - 1, 0), 2)
     place = project(points if axes else points[..., None, :], poses, camera)
-    found = np.nan_to_num(illumination(camera, place[..., 0], place[..., 1]), nan=1.0)
+    found = np.nan_to_num(_at(camera, place), nan=1.0)
     return found if axes else found[..., 0]
 
 
@@ -58,5 +59,4 @@ def dimming_of_one(pictures: Pictures, points: np.ndarray) -> np.ndarray | float
     if not pictures.scene.camera.is_dimmed:
         return 1.0
     place = project(points.reshape(-1, 3), pictures.sensors.reshape(-1, 2)[0], pictures.scene.camera)
-    found = np.nan_to_num(illumination(pictures.scene.camera, *place.T), nan=1.0)
-    return found.reshape(points.shape[:-1])
+    return np.nan_to_num(_at(pictures.scene.camera, place), nan=1.0).reshape(points.shape[:-1])

@@ -20,10 +20,8 @@ import render
 import scenes
 from imaging.geometry.blur import blur_in_focus
 from imaging.geometry.projection import camera_frame, project
-from measure.correction import RENDERING
 from scenes import Picture, Pose, Scene
-from scenes.status import is_trusted
-from tests.proofs.kinds import Row, summed_up
+from tests.proofs.kinds import Row, summed_up, told
 from validation import simulation
 from validation.remeasured import Method
 
@@ -83,16 +81,7 @@ def rows(
 def _rows(picture: Picture, method: Method, images: np.ndarray, true: np.ndarray) -> list[Row]:
     off = simulation.simulated(picture, method)
     found = measure.measure(images, picture, method.locator, correction=off)
-    good, told = is_trusted(found.status), []
-    rays = np.hypot(off.sources[RENDERING], off.beside)
-    for m, name in enumerate(found.names):
-        some, sigma = found.value[:, m][good[:, m]], off.sigma[m]
-        measured = some.var(ddof=1) if len(some) > 1 else np.nan
-        mean = (some.mean() - true[m]) / sigma if len(some) and sigma > 0 else np.nan
-        told.append(Row(picture.sensor, name, off.status[m], float(good[:, m].mean()), len(some),
-                        measured / sigma**2 if sigma > 0 else np.nan,
-                        mean, rays[m] / sigma))  # fmt: skip
-    return told
+    return told(picture, found, true, off)
 
 
 def field_blur(
@@ -106,10 +95,10 @@ def field_blur(
     for k in range(poses):
         for i, place in enumerate(places()):
             picture = picture_at(scene(), place, rng)
-            told, untold = rows(picture, images, rng, _SEEDS + 9 * k + i, locator)
-            print(f"place ({place[0]:+.0f}, {place[1]:+.0f}) px, blur {blur_of(picture):.2f} px", *told, sep="\n")
-            print("  as if it were even:", *untold, sep="\n  ", flush=True)
-            every, blind = every + told, blind + [replace(row, status="ok") for row in untold]
+            seen, unseen = rows(picture, images, rng, _SEEDS + 9 * k + i, locator)
+            print(f"place ({place[0]:+.0f}, {place[1]:+.0f}) px, blur {blur_of(picture):.2f} px", *seen, sep="\n")
+            print("  as if it were even:", *unseen, sep="\n  ", flush=True)
+            every, blind = every + seen, blind + [replace(row, status="ok") for row in unseen]
     print("ignoring the field:", ignored(every, blind))
     raise typer.Exit(0 if summed_up(every) else 1)
 

@@ -111,26 +111,23 @@ def rows(
     clean = render.image(picture, quality=render.Quality(seed=seed, everywhere=everywhere))
     found = measure.measure(render.expose(clean, scene.noise, rng, images), picture, correction=off)
     true = np.array([values[name] for name in found.names])
-    good = is_trusted(found.status)
+    return told(picture, found, true, off), _zone_rows(picture, found, true, off)
+
+
+def told(picture: Picture, found: measure.Measurements, true: np.ndarray, off: measure.Correction) -> list[Row]:
+    """How the numbers (n, M) found in noisy images of a picture scatter about true ones (M,), over what is told."""
+    good, rows = is_trusted(found.status), []
     rays = np.hypot(off.sources[RENDERING], off.beside)
-    told = []
     for m, name in enumerate(found.names):
         some, sigma = found.value[:, m][good[:, m]], off.sigma[m]
+        known = sigma > 0
         measured = some.var(ddof=1) if len(some) > 1 else np.nan
-        mean = (some.mean() - true[m]) / sigma if len(some) else np.nan
-        told.append(
-            Row(
-                picture.sensor,
-                name,
-                off.status[m],
-                float(good[:, m].mean()),
-                len(some),
-                measured / sigma**2,
-                mean,
-                rays[m] / sigma,
-            )
-        )
-    return told, _zone_rows(picture, found, true, off)
+        mean = (some.mean() - true[m]) / sigma if len(some) and known else np.nan
+        rows.append(Row(
+            picture.sensor, name, off.status[m], float(good[:, m].mean()), len(some),
+            measured / sigma**2 if known else np.nan, mean, rays[m] / sigma,
+        ))  # fmt: skip
+    return rows
 
 
 def _zone_rows(
