@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 
 import imaging
@@ -35,9 +34,10 @@ from validation.batch.store import RunFile
 from validation.batch.work import CHUNK, Chunks, Rendering, TaskResult
 from validation.code_digest import digest
 from validation.defaults import DEFAULT_SEED
+from validation.versions import PROGRAM, version
 
 log = logging.getLogger("validation")
-_PACKAGES = ("ice-vision", "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
+_PACKAGES = (PROGRAM, "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
 _PHOTOGRAPHS = "photographs"  # in the place of the renderer's variant
 _MAX_CHUNKS = 4  # of a task: its results are lost if it is killed
 _IMAGES = 64  # settings whose image is kept for the report

@@ -9,15 +9,14 @@ import typer
 from scenes import plugins
 from validation.cli import verbosity
 from validation.cli.commands import Commands
+from validation.versions import version
 
 app = typer.Typer(cls=Commands, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        print(f"ice {version('ice-vision')}")
+        print(f"ice {version()}")
         raise typer.Exit
 
 

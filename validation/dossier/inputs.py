@@ -7,7 +7,6 @@ import json
 import platform
 import re
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +21,8 @@ from scenes.load import find
 from validation.batch import machine
 from validation.batch.part_files import by_content, digest, digests
 from validation.code_digest import digest as code_digest
+from validation.versions import PROGRAM, required, version
 
-_PROGRAM = "ice-vision"
 _HOST = ("system", "cores", "python")  # what does not decide a number, or is told beside
 
 
@@ -40,8 +39,8 @@ def versions(variant: str) -> dict[str, str]:
     """Of the program, its code (SHA-256), Python, the renderer's variant and all libraries that the program needs."""
     code = code_digest((scenes, imaging, planner, render, measure, validation), ())
     return {
-        _PROGRAM: version(_PROGRAM), "code (SHA-256)": code.hex(), "python": platform.python_version(),
-        "renderer's variant": variant, **{name: _installed(name) for name in _libraries()},
+        PROGRAM: version(), "code (SHA-256)": code.hex(), "python": platform.python_version(),
+        "renderer's variant": variant, **{name: version(name) for name in _libraries()},
     }  # fmt: skip
 
 
@@ -73,12 +72,5 @@ def record(scene: Scene) -> str:
 
 def _libraries() -> list[str]:
     """Names of what the program needs, without its extras."""
-    told = [each for each in requires(_PROGRAM) or () if "extra ==" not in each]
+    told = [each for each in required() if "extra ==" not in each]
     return sorted(re.split(r"[\[<>=!~; ]", each)[0] for each in told)
-
-
-def _installed(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "not installed"

@@ -9,7 +9,6 @@ import math
 import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.metadata import version
 from itertools import count
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -20,6 +19,7 @@ from scenes.measurands.zone import joint_parts
 from scenes.status import is_trusted
 from scenes.units import Unit, in_unit
 from validation.inspection import Inspection
+from validation.versions import version
 
 _NAMESPACE = "http://qifstandards.org/xsd/qif3"
 _DECIDED = {"pass": "PASS", "fail": "FAIL", "undecided": "INDETERMINATE", None: "NOT_ANALYZED"}
@@ -39,7 +39,7 @@ def document(found: Inspection, serial: str = "") -> bytes:
     root = Element("QIFDocument", {"xmlns": _NAMESPACE, "versionQIF": "3.0.0", "idMax": "0"})
     identity = _child(root, "QPId")
     header = _child(_child(root, "Header"), "Application")
-    _child(header, "Name", f"ice-vision {version('ice-vision')}")
+    _child(header, "Name", f"ice-vision {version()}")
     standard = next(ids)
     _standard(root, standard)
     _units(root, scene.units)
