@@ -53,6 +53,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "cost": ("small.toml", "--budget", "1s", "--out", "cost"),
     "explore": ("small.toml",),
     "hard": ("--area", "reflectance"),
+    "merge": ("finished", "-o", "whole"),
     "report": ("finished",),
     "compare": ("finished", "changed.json"),
 }

@@ -215,8 +215,9 @@ class _Batch:
 
     def __post_init__(self) -> None:
         wanted = self.photos.counts if self.photos else [self.renders] * len(self.campaign)
-        self.stages = Stages([wanted, *self.store.fact("stages", [])])
-        self.done = self.store.images()
+        self.settings = self.options.shard.settings(len(self.campaign))
+        self.stages = Stages([wanted, *self.store.fact("stages", [])], self.settings)
+        self.done = self.store.images(self.options.shard)
 
     @property
     def total(self) -> int:
@@ -301,7 +302,7 @@ class _Batch:
 
     def _settings(self) -> Iterator[_Setting]:
         """The settings that have work left, one at a time."""
-        for index in range(len(self.campaign)):
+        for index in self.settings:
             if self.photos and index in self.photos.troubles and not self.store.trouble(index):
                 self._commit(index, TaskResult(None, {}, self.photos.troubles[index]))
             done = self.store.chunks(index)

@@ -9,6 +9,7 @@ from pathlib import Path
 from render.phenomena import named
 from scenes import InvalidInput
 from validation.batch import cluster
+from validation.batch.shard import Shard
 from validation.batch.work import Rendering
 from validation.defaults import DEFAULT_SEED
 
@@ -33,6 +34,8 @@ class RunOptions:
         Used instead of both.
     rendering : Rendering
         How noise-free images are made.
+    shard : Shard
+        Which settings are worked on; the numbers do not depend on it.
 
     Raises
     ------
@@ -47,6 +50,7 @@ class RunOptions:
     dask: str | None = None
     executor: Executor | None = None
     rendering: Rendering = Rendering()
+    shard: Shard = Shard()
 
     def __post_init__(self) -> None:
         if self.rendering.effects != "auto":

@@ -23,7 +23,7 @@ from validation.batch.store import RunFile
 from validation.batch.work import methods
 from validation.statistics import Verdict
 
-_WAITING = "not yet worked on"
+WAITING = "not yet worked on"
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,10 +86,10 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
             each = [_found(i, column(main, k), store, m.get("correction")) for k, m in enumerate(model["measurands"])]
             rows.add(i, scene.name, model, found, each)
         else:
-            refused[i] = store.trouble(i) or _WAITING
+            refused[i] = store.trouble(i) or WAITING
     if not rows:
         reason = next(iter(refused.values()))
-        raise InvalidInput("the run must have measured a setting, got none yet" if reason == _WAITING else reason)
+        raise InvalidInput("the run must have measured a setting, got none yet" if reason == WAITING else reason)
     scale = _free_scale(campaign, rows)
     rows.finish(scale)
     return Validation(
@@ -102,7 +102,7 @@ def collect(campaign: Campaign, store: RunFile) -> Validation:
         refused=refused,
         search=_search(campaign, scale),
         correlation=_correlations(campaign, rows),
-        verdict=_verdict(rows, sum(reason != _WAITING for reason in refused.values()), truth),
+        verdict=_verdict(rows, sum(reason != WAITING for reason in refused.values()), truth),
         classic_verdicts={name: _judge(rows.judged(name), truth=truth) for name in rows.others},
         seconds={"wall": store.fact("wall", 0.0), "workers": store.fact("workers", 0), **store.seconds()},
         machines=tuple(store.fact("machines", [])),

@@ -14,16 +14,19 @@ class Stages:
     ----------
     wanted : list of sequence of int
         Images of each setting in all, after the first stage, the second, ...
+    settings : sequence of int, optional
+        Which of them are worked on; all when not given.
 
     Attributes
     ----------
     total : int
-        Images of all settings.
+        Images of the settings that are worked on.
     """
 
-    def __init__(self, wanted: list[Sequence[int]]) -> None:
+    def __init__(self, wanted: list[Sequence[int]], settings: Sequence[int] | None = None) -> None:
         self._wanted = [[int(n) for n in stage] for stage in wanted]
-        self.total = sum(self._wanted[-1])
+        self._settings = range(len(wanted[0])) if settings is None else settings
+        self.total = self._sum()
 
     @property
     def later(self) -> list[list[int]]:
@@ -36,8 +39,11 @@ class Stages:
         if grown == self._wanted[-1]:
             return False
         self._wanted.append(grown)
-        self.total = sum(grown)
+        self.total = self._sum()
         return True
+
+    def _sum(self) -> int:
+        return sum(self._wanted[-1][setting] for setting in self._settings)
 
     def sizes(self, index: int) -> dict[int, int]:
         """Images of each chunk of a setting.

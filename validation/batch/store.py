@@ -20,6 +20,7 @@ from scenes.errors import describe, one_line
 from validation.batch import facts
 from validation.batch.campaign import Campaign
 from validation.batch.part_files import by_content, contents
+from validation.batch.shard import Shard
 from validation.batch.stopped import Stopped
 from validation.batch.work import CHUNK, Chunk, Clean, Packed, TaskResult
 
@@ -193,6 +194,28 @@ class RunFile:
             for number, chunk in found.chunks.items():
                 self._add_chunk(setting, number, chunk)
 
+    def take(self, other: RunFile) -> None:
+        """Commit all that another file of the same run holds of settings that this one has nothing of.
+
+        Raises
+        ------
+        InvalidInput
+            If the other file is of another run, or both hold the same setting.
+        """
+        if texts := list(itertools.islice(_differences(by_content(self.identity()), by_content(other.identity())), 3)):
+            raise InvalidInput(f"{other.path} must be of the same run as {self.path}, got one where {', '.join(texts)}")
+        both = self._begun() & other._begun()
+        if both:
+            raise InvalidInput(f"{other.path} must hold other settings than {self.path}, got {min(both)} in both")
+        with self._transaction():
+            for name in _TABLES.keys() - {"run"}:
+                for row in other._each(f"SELECT * FROM {name}"):
+                    self._db.execute(f"INSERT INTO {name} VALUES ({', '.join('?' * len(row))})", row)
+
+    def _begun(self) -> set[int]:
+        """Settings of which anything is known."""
+        return {setting for (setting,) in self._rows("SELECT setting FROM setting UNION SELECT setting FROM chunk")}
+
     def drop_image(self, setting: int) -> None:
         """Give up the image of a finished setting, so that a long campaign's file stays small."""
         with self._transaction():
@@ -228,9 +251,10 @@ class RunFile:
             raise self._damaged(f"the chunks of setting {setting}")
         return dict(rows)
 
-    def images(self) -> int:
-        """Number of images measured so far."""
-        (found,) = self._rows("SELECT COALESCE(SUM(count), 0) FROM chunk")[0]
+    def images(self, shard: Shard = Shard()) -> int:
+        """Number of images measured so far, in the settings of a shard."""
+        query = "SELECT COALESCE(SUM(count), 0) FROM chunk WHERE setting % ? = ?"
+        (found,) = self._rows(query, shard.of, shard.number - 1)[0]
         if not (isinstance(found, int) and found >= 0):
             raise self._damaged("the number of images")
         return found

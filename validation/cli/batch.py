@@ -13,6 +13,7 @@ import typer
 
 from scenes import InvalidInput
 from validation.batch import campaign
+from validation.batch.shard import Shard
 from validation.cli.common import (
     MOST_WORKERS,
     Effects,
@@ -59,6 +60,10 @@ class Options:
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.")] = (
         None
     )
+    shard: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Only the I-th of N parts of the settings; `ice merge` puts them together."),
+    ] = None
     fresh: Annotated[bool, typer.Option("--fresh", help="Start anew even if DIR holds results.")] = False
     accuracy: Annotated[
         float | None,
@@ -94,7 +99,8 @@ class Options:
         from validation.batch.work import Rendering
 
         rendering = Rendering(effects=self.effects, tolerance=tolerance(self.bias_px, self.variance))
-        return RunOptions(self.seed, directory, self.workers, self.fresh, self.dask, rendering=rendering)
+        shard = Shard() if self.shard is None else Shard.parse(self.shard)
+        return RunOptions(self.seed, directory, self.workers, self.fresh, self.dask, rendering=rendering, shard=shard)
 
 
 @dataclass(frozen=True)
@@ -129,6 +135,8 @@ def validate_command(given: Options) -> None:
     directory = given.out or Path("runs") / loaded.name
     check_directory("--out", directory)
     goal = _goal(given.accuracy, given.budget, started)
+    if goal is not None and given.shard is not None:
+        raise InvalidInput(f"--shard must be given without --accuracy and --budget, got {given.shard}")
     taken = _photographs(loaded, given.photos, given.exact_poses, goal is not None)
     done = _run(given, taken.campaign if taken else loaded, directory, goal, taken)
     if given.as_json:
@@ -154,7 +162,7 @@ def _run(
                 found = run_by(options, loaded, given.renders, shown, photos=taken)
             else:
                 found, reached = reach(loaded, goal, options, lambda line: print(line, file=sys.stderr), shown)
-        station = _write(loaded, found, directory)
+        station = write_files(loaded, found, directory)
     reached = reached and replace(reached, seconds=time.perf_counter() - goal.started)
     return Finished(loaded, directory, found, station, reached)
 
@@ -227,7 +235,7 @@ def _goal(accuracy: float | None, budget: str | None, started: float) -> Goal | 
     return Goal(accuracy, None if budget is None else seconds(budget), started)
 
 
-def _write(loaded: campaign.Campaign, found: Validation, directory: Path) -> Station:
+def write_files(loaded: campaign.Campaign, found: Validation, directory: Path) -> Station:
     """All files of a run; the station that they show."""
     from validation.batch.store import RunFile
     from validation.report import export, figures, page

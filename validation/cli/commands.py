@@ -31,6 +31,7 @@ COMMANDS = {
     "cost": ("cost", "Measure what each parameter costs and gives on this machine."),
     "explore": ("explore", "A page on which camera and lights are dragged and the prediction answers."),
     "hard": ("hard", "Answers beside references where numbers lose their digits."),
+    "merge": ("merge", "Put the parts of a run together that machines made (`ice validate --shard`)."),
     "report": ("report", "Write report.html, report.md and tables of a run."),
     "compare": ("compare", "Which settings changed beyond chance from one run to another?"),
 }

@@ -66,6 +66,7 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
         "--json": (),
     }),
     "compare": (["RUN", "RUN"], {"--level": ("0.5", "1"), "--json": ()}),
+    "merge": (["RUN", "DAMAGED", "-o", "OUT"], {"--fresh": (), "--json": ()}),
     "report": (["DAMAGED"], {"--out": ("FILE/x",), "--json": (), "--parquet": ()}),
     "calibrate": (["SCENE", "--images", "1"], {"--seed": ("1",), "-o": ("OUT.png",)}),
     "cost": (["SCENE", "--seed", "-1"], {"--out": ("OUT",), "--budget": ("0s", "x", "1s")}),
