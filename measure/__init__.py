@@ -24,6 +24,7 @@ from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.photograph import MeasuredShape, Shapes, photograph
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
+from measure.photon_transfer import FramePair, PhotonTransfer, photon_transfer
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
 
@@ -39,6 +40,7 @@ __all__ = [
     "EstimatorKind",
     "Fit",
     "FittedField",
+    "FramePair",
     "Images",
     "Intrinsics",
     "MeasuredShape",
@@ -46,6 +48,7 @@ __all__ = [
     "Measurement",
     "Measurements",
     "NoiseCurve",
+    "PhotonTransfer",
     "Propagated",
     "PropagatedValues",
     "Quadrilateral",
@@ -71,6 +74,7 @@ __all__ = [
     "mtf",
     "noise_curve",
     "photograph",
+    "photon_transfer",
     "propagate",
     "region_of_interest",
 ]

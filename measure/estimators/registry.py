@@ -57,15 +57,9 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     name = known_name(name)
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
-    if layout.optics.colour is not None and name in _ALIKE:
+    sensor = layout.optics.sensor
+    if name in _ALIKE and (sensor.colour is not None or sensor.is_shared):
         others = ", ".join(each for each in ESTIMATORS if each not in _ALIKE)
-        raise InvalidInput(
-            f"estimator must be one of {others} with noise.colour, whose pixels are not alike, got {name!r}"
-        )
-    if layout.optics.sensor.is_shared and name == "arrangement":
-        others = ", ".join(each for each in ESTIMATORS if each != name)
-        raise InvalidInput(
-            f"estimator must be one of {others} with noise.row_sigma or column_sigma, as pixels are not independent, "
-            f"got {name!r}"
-        )
+        why = "colour, whose pixels are not alike" if sensor.colour else "row_sigma or column_sigma, which pixels share"
+        raise InvalidInput(f"estimator must be one of {others} with noise.{why}, got {name!r}")
     return ESTIMATORS[name].prepare(layout, threshold)
