@@ -6,6 +6,7 @@ ice_vision.check(__file__, "scenes", "imaging")
 
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
+from measure.boards.dots import dot_grid
 from measure.bounds import bound
 from measure.correction import Correction, Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
@@ -62,6 +63,7 @@ __all__ = [
     "correction",
     "distance",
     "distances",
+    "dot_grid",
     "find",
     "find_ellipse",
     "fit",
