@@ -102,7 +102,7 @@ def rows_by_raw(noise: Noise, rows: sparse.csr_array, shape: tuple[int, int]) ->
 
 def picture_variance(noise: Noise, levels: np.ndarray) -> np.ndarray:
     """Variance over repeated pictures of each pixel of a picture (height, width) of noise-free levels."""
-    found = seen(noise, levels).noise_variance
+    found = seen(noise, levels).noise_variance + noise.row_sigma**2 + noise.column_sigma**2
     if noise.colour is None or not noise.colour.interpolates:
         return found
     taken, used = by_raw(noise.colour, np.arange(levels.size), levels.shape)

@@ -6,6 +6,7 @@ ice_vision.check(__file__, "scenes", "imaging")
 
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
+from measure.boards.dots import dot_grid
 from measure.bounds import bound
 from measure.correction import Correction, Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
@@ -24,6 +25,7 @@ from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.photograph import MeasuredShape, Shapes, photograph
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
+from measure.photon_transfer import FramePair, PhotonTransfer, photon_transfer
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
 
@@ -39,6 +41,7 @@ __all__ = [
     "EstimatorKind",
     "Fit",
     "FittedField",
+    "FramePair",
     "Images",
     "Intrinsics",
     "MeasuredShape",
@@ -46,6 +49,7 @@ __all__ = [
     "Measurement",
     "Measurements",
     "NoiseCurve",
+    "PhotonTransfer",
     "Propagated",
     "PropagatedValues",
     "Quadrilateral",
@@ -59,6 +63,7 @@ __all__ = [
     "correction",
     "distance",
     "distances",
+    "dot_grid",
     "find",
     "find_ellipse",
     "fit",
@@ -71,6 +76,7 @@ __all__ = [
     "mtf",
     "noise_curve",
     "photograph",
+    "photon_transfer",
     "propagate",
     "region_of_interest",
 ]

@@ -12,6 +12,7 @@ from scipy import sparse
 from imaging.colour import rows_by_raw, seen
 from imaging.models.bias import MOST
 from imaging.models.extremes import with_extremes
+from imaging.row_noise import of_shared
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.kinds import ESTIMATORS
 from measure.estimators.separate import SeparateEstimator
@@ -110,7 +111,7 @@ def propagate(
     value: ``ill_conditioned``. With g the derivative of a
     value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
     share pixels, and so their correlation is in g. Of a colour sensor g is taken by the raw pixels, which are
-    independent.
+    independent. Noise that rows and columns share is added by the sums of g over each.
 
     Parameters
     ----------
@@ -135,7 +136,7 @@ def propagate(
         if gone and state[m] in status.MEASURED:  # noise decides which of two edges is found, or a wrong one was
             state[m] = status.ILL_CONDITIONED
     by_raw = rows_by_raw(sensor_noise, rows, clean.shape)
-    errors = (by_raw.multiply(noise).tocsr() @ by_raw.T).toarray()
+    errors = (by_raw.multiply(noise).tocsr() @ by_raw.T).toarray() + of_shared(sensor_noise, rows, clean.shape[1])
     errors[np.diag_indices(len(errors))] += _of_forms(found)
     gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
     image, plane = (

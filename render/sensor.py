@@ -64,6 +64,7 @@ def expose(
     height, width = image.shape
     pictures = np.empty((count, height, width))
     pictures[:] = digitised(steady.copy(), noise)
+    rows, columns = _shared(noise, key, count, image.shape)
     across = -(-width // TILE)
     for index in range(across * -(-height // TILE)):
         top, left = TILE * (index // across), TILE * (index % across)
@@ -73,8 +74,17 @@ def expose(
             block = stream.standard_normal((count, *steady[tile].shape))
             block *= sigma[tile]
             block += steady[tile]
+            if noise.is_shared:
+                block += rows[:, tile[0], None] + columns[:, None, tile[1]]
             pictures[(slice(None), *tile)] = digitised(block, noise)
     return pictures
+
+
+def _shared(noise: Noise, key: np.ndarray, count: int, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """What rows (count, height) and columns (count, width) have in common, grey levels, from a stream of its own."""
+    stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 1, 0]))
+    rows, columns = (stream.standard_normal((count, size)) if noise.is_shared else np.zeros((0, 0)) for size in shape)
+    return noise.row_sigma * rows, noise.column_sigma * columns
 
 
 def digitised(levels: np.ndarray, noise: Noise) -> np.ndarray:

@@ -378,6 +378,7 @@ class Scene(Model):
         _ = self.surfaces  # names of faces
         self._check_curved()
         self._check_colour()
+        self._check_forms()
         check_textures(self.textures, self.solid)
         check_uncertain(self, self.uncertain)
         self.uncertainty.check_once(self.uncertain)
@@ -456,6 +457,12 @@ class Scene(Model):
             raise ValueError("camera.lens must be without distortion for a curved object, got one that bends")
         if self.textures:
             raise ValueError(f"textures must be none for a curved object, got {len(self.textures)}")
+
+    def _check_forms(self) -> None:
+        """The law of a form's size takes its points' errors for those of independent pixels."""
+        forms = [each.name for each in self.measurands if MEASURANDS[each.kind].is_form]
+        if self.noise.is_shared and forms:
+            raise ValueError(f"noise.row_sigma and column_sigma must be 0 for forms, got some with {', '.join(forms)}")
 
     def _check_colour(self) -> None:
         """The picture is not sharper than demosaicing leaves it, nor its locator finer than the pixels read."""

@@ -51,6 +51,18 @@ class Rig:
         width, height = self.size
         return fine.reshape(height, samples, width, samples).mean((1, 3), dtype=float)
 
+    def dots(self, pose: np.ndarray, radius: float, samples: int = 5) -> np.ndarray:
+        """The same of columns x rows dark dots, whose radius is so much of the way from one to the next."""
+        gx, gy = self._on_board(pose, samples)
+        columns, rows = self.board
+        x, y = np.clip(np.rint(gx), 0, columns - 1), np.clip(np.rint(gy), 0, rows - 1)
+        dark, bright = self.levels
+        fine = (bright - (bright - dark) * _step(radius - np.hypot(gx - x, gy - y))).astype(np.float32)
+        left = np.sqrt((self.blur * samples) ** 2 - 1 / 12)
+        fine = cv2.GaussianBlur(fine, (0, 0), left, borderType=cv2.BORDER_REPLICATE)
+        width, height = self.size
+        return fine.reshape(height, samples, width, samples).mean((1, 3), dtype=float)
+
     def _on_board(self, pose: np.ndarray, samples: int) -> tuple[np.ndarray, np.ndarray]:
         """Place on the board, in squares, of every sample."""
         x, y = (np.arange(-COARSE, n + 2 * COARSE, COARSE, dtype=float) for n in self.size)

@@ -56,6 +56,8 @@ class RimImage:
         Which points of an arc are `locator.reach` off its ends; others have no contrast.
     blur : ndarray, shape (..., n), or float
         Standard deviation of the lens' blur there, px.
+    place, normal : ndarray, shape (..., n, 2), optional
+        Where they are, px, and unit normals.
     """
 
     design: np.ndarray
@@ -66,6 +68,8 @@ class RimImage:
     turn: float = 1.0
     off_ends: np.ndarray | None = None
     blur: np.ndarray | float = 0.0
+    place: np.ndarray | None = None
+    normal: np.ndarray | None = None
 
     @property
     def left(self) -> np.ndarray:
@@ -106,14 +110,16 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> RimImag
     turn = circle.turn / (2 * np.pi)
     off_ends = None if circle.ends is None else within_ends(pictures, circle, angle)
     away = depth(circle.at(angle), pictures.sensors, scene.camera)
-    blur = blur_at(scene.camera, away, project(circle.at(angle), pictures.sensors, scene.camera))
+    place = project(circle.at(angle), pictures.sensors, scene.camera)
+    blur = blur_at(scene.camera, away, place)
     if seen is not None:
         squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
-        return RimImage(design, arc, _off(squared, off_ends), seen.noise_variance, seen.good, turn, off_ends, blur)
+        squared = _off(squared, off_ends)
+        return RimImage(design, arc, squared, seen.noise_variance, seen.good, turn, off_ends, blur, place, normal)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
-    return RimImage(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends, blur)
+    return RimImage(design, arc, _off(squared, off_ends), noise, clear, turn, off_ends, blur, place, normal)
 
 
 def _off(squared: np.ndarray, off_ends: np.ndarray | None) -> np.ndarray:
@@ -128,7 +134,13 @@ def fisher_circle(circle: RimImage, weights: np.ndarray, counted: np.ndarray | N
     return _covariance(information, enough if counted is None else enough & (counted.sum(-1) > 3))
 
 
-def calibrated_circle(circle: RimImage, kappa2: np.ndarray | float, scale: float, weakest: float) -> np.ndarray:
+def calibrated_circle(
+    circle: RimImage,
+    kappa2: np.ndarray | float,
+    scale: float,
+    weakest: float,
+    shared: np.ndarray | None = None,
+) -> np.ndarray:
     """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
 
     Points weigh as the squared contrast over the noise's variance. ``kappa2``, (..., n) or one number, is a point's
@@ -136,7 +148,8 @@ def calibrated_circle(circle: RimImage, kappa2: np.ndarray | float, scale: float
     second order, as along an edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less
     2 scale^2 at each end of a piece that is used; infinite where the pieces are so short that this would not be
     positive. Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are left
-    out; a tenth of a turn must be left.
+    out; a tenth of a turn must be left. ``shared``, (..., n, n), is what the points' errors have in common at unit
+    contrast (`imaging.row_noise.of_points`).
     """
     taken = circle.clear | circle.crowded[..., None]
     ratio = circle.squared / circle.noise_variance
@@ -150,6 +163,10 @@ def calibrated_circle(circle: RimImage, kappa2: np.ndarray | float, scale: float
     inverse = _covariance(information, (circle.turn * used.mean(-1) >= LEAST_SEEN) & _positive(scatter))
     good = np.isfinite(inverse).all((-1, -2))[..., None, None]
     known = np.where(good, inverse, 0.0)
+    if shared is not None:
+        pull = np.where(used, circle.arc * np.sqrt(circle.squared) / circle.noise_variance, 0.0)[..., None]
+        pull = pull * circle.design
+        scatter = scatter + np.einsum("...ni,...nm,...mj->...ij", pull, np.nan_to_num(shared), pull, optimize=True)
     return np.where(good, known @ scatter @ known, inverse)
 
 

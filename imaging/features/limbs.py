@@ -30,10 +30,14 @@ def _limb_rim(pictures: Pictures, curved: Curved) -> RimImage:
     clear = seen.good & clear_of_others(pictures, curved, outline, seen)
     camera = pictures.scene.camera
     away = depth(np.where(outline.seen[..., None], outline.points, curved.centre), pictures.sensors, camera)
-    return rim_of(outline, seen, clear, blur_at(camera, away, np.nan_to_num(outline.at) + image_centre(camera)))
+    place = np.nan_to_num(outline.at) + image_centre(camera)
+    return rim_of(outline, seen, clear, place, blur_at(camera, away, place))
 
 
-def rim_of(outline: LimbOutline, seen: LimbLook, clear: np.ndarray, blur: np.ndarray | float = 0.0) -> RimImage:
+def rim_of(
+    outline: LimbOutline, seen: LimbLook, clear: np.ndarray, place: np.ndarray, blur: np.ndarray | float = 0.0
+) -> RimImage:
     """As a circle's rim; places that are not there have no contrast."""
     design, arc = np.nan_to_num(outline.design), np.nan_to_num(outline.arc)
-    return RimImage(design, arc, seen.squared, seen.noise_variance, clear, blur=blur)
+    normal = np.nan_to_num(outline.outward)
+    return RimImage(design, arc, seen.squared, seen.noise_variance, clear, blur=blur, place=place, normal=normal)

@@ -6,11 +6,13 @@ import numpy as np
 
 from imaging.features.circles import calibrated_circle
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kappa2
+from imaging.features.measurand import normals
 from imaging.light.appearance import is_separable
 from imaging.models.along import NODE_WEIGHTS, Along, EdgeNodes
 from imaging.models.errors import Errors, combined
 from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
+from imaging.row_noise import of_lines, of_points
 
 SHORT = 10.0  # smoothing scales: shorter edges take the double integral
 
@@ -24,8 +26,9 @@ def calibrated(pictures: Pictures) -> Errors:
     2 sqrt(pi) s integral of g^2 - 2 s^2 (g^2 at both ends) + 8/3 s^4 g'^2, g = f sigma, exact for a linear g on a long
     edge; on an edge of less than 10 s the double integral itself. Where the contrast changes by more than a factor 2
     along an edge (gloss, or another part of the object behind it), points below `MIN_CONTRAST` are dropped and the
-    first order alone is taken. Infinite where an edge has too little contrast or length to be measured. Errors are
-    found where the lens records the edge; its local magnification takes them to ideal px.
+    first order alone is taken. What rows and columns of pixels share is added (`imaging.row_noise`). Infinite where an
+    edge has too little contrast or length to be measured. Errors are found where the lens records the edge; its local
+    magnification takes them to ideal px.
     """
     return pictures.once("calibrated", lambda: _calibrated(pictures))
 
@@ -52,12 +55,28 @@ def _calibrated(pictures: Pictures) -> Errors:
                 kept = squared >= MIN_CONTRAST**2 * noise
                 first_order = _first_order(nodes, a, b, per_point, kept)
                 variance = np.where(rough, 2 * np.sqrt(np.pi) * scale * first_order, variance)
+            if scene.noise.is_shared:
+                variance = variance + _of_shared(pictures, along, a, b)
         return np.where(weak, np.inf, variance)
 
     def found(circle) -> np.ndarray:
-        return calibrated_circle(circle, kappa2(scale, circle.blur), scale, MIN_CONTRAST**2)
+        noise, shared = scene.noise, None
+        if noise.is_shared:
+            shared = of_points(noise, circle.place, circle.normal, circle.arc, circle.blur, scale)
+        return calibrated_circle(circle, kappa2(scale, circle.blur), scale, MIN_CONTRAST**2, shared)
 
     return combined(pictures, line_variance, squared.mean(-1), noise.mean(-1), found)
+
+
+def _of_shared(pictures: Pictures, along: Along, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """What noise that rows and columns share adds to the variance of each line (..., E), at its mean contrast."""
+    scene, nodes = pictures.scene, along.nodes
+    blur, across = (np.mean(part * np.ones(1), -1) for part in (nodes.blur, nodes.across))
+    length, slope = nodes.length[..., 0], line_slope(nodes, a, b)[..., 0]
+    added = of_lines(
+        scene.noise, a / length, slope, length, normals(along.measurands.view), blur, scene.locator.scale_px
+    )
+    return added * across**2 / along.squared.mean(-1)
 
 
 def point_variance(nodes: EdgeNodes, scale: float) -> np.ndarray | float:

@@ -31,7 +31,7 @@ _MOST = 200  # corners along a side
 
 @dataclass(frozen=True, eq=False)
 class Board:
-    """A chessboard's inner corners in one image.
+    """A chessboard's inner corners, or the dots of a grid, in one image.
 
     Attributes
     ----------
@@ -49,6 +49,8 @@ class Board:
         Standard deviation of a pixel's noise, grey levels, given or estimated.
     blur_px : float
         Median standard deviation of the lens blur, px.
+    radius : float
+        Of a grid of dots (`measure.dot_grid`) the dots' radius over the way from one to the next; 0 of a chessboard.
     """
 
     shape: tuple[int, int]
@@ -58,6 +60,7 @@ class Board:
     p_value: np.ndarray
     noise: float
     blur_px: float
+    radius: float = 0.0
 
     @property
     def measured(self) -> np.ndarray:

@@ -23,10 +23,11 @@ def best_estimator(scene: Scene) -> str:
     """What an image of a scene is best measured by: ``arrangement`` where one convex body stands before darkness.
 
     There it is the most precise, and tells by its goodness of fit whether the image is what it takes it for. Where
-    things hide or shade each other, and where a colour sensor's pixels are not alike, ``gradient``, whose errors and
-    bias the planner knows.
+    things hide or shade each other, and where a colour sensor's pixels are not alike or those of a row share noise,
+    ``gradient``, whose errors and bias the planner knows.
     """
-    return "arrangement" if is_plain(scene) and scene.noise.colour is None else "gradient"
+    alike = scene.noise.colour is None and not scene.noise.is_shared
+    return "arrangement" if is_plain(scene) and alike else "gradient"
 
 
 def known_name(name: str) -> str:
@@ -56,9 +57,9 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     name = known_name(name)
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
-    if layout.optics.colour is not None and name in _ALIKE:
+    sensor = layout.optics.sensor
+    if name in _ALIKE and (sensor.colour is not None or sensor.is_shared):
         others = ", ".join(each for each in ESTIMATORS if each not in _ALIKE)
-        raise InvalidInput(
-            f"estimator must be one of {others} with noise.colour, whose pixels are not alike, got {name!r}"
-        )
+        why = "colour, whose pixels are not alike" if sensor.colour else "row_sigma or column_sigma, which pixels share"
+        raise InvalidInput(f"estimator must be one of {others} with noise.{why}, got {name!r}")
     return ESTIMATORS[name].prepare(layout, threshold)

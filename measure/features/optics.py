@@ -9,6 +9,7 @@ import numpy as np
 from imaging.colour import by_raw, raw_variance
 from imaging.geometry.blur import blur_times
 from imaging.geometry.lens import lens_jacobian, recorded, undistorted
+from imaging.row_noise import shared
 from imaging.sensor import headroom
 from imaging.sensor import recorded as expected
 from scenes import Camera, Noise, Scene
@@ -57,7 +58,8 @@ class Optics:
     def of(cls, scene: Scene) -> Optics:
         """The scene's camera, noise and locator settings."""
         camera, locator, noise = scene.camera, scene.locator, scene.noise
-        uneven = noise if noise.gain > 0 or noise.bits is not None or noise.colour is not None else None
+        is_white = noise.gain == 0 and noise.bits is None and noise.colour is None and not noise.is_shared
+        uneven = None if is_white else noise
         bent = camera if camera.lens.bends else None
         shape = camera.height, camera.width
         return cls(
@@ -110,7 +112,7 @@ class Optics:
 
         Where the noise depends on the light each pixel's variance is taken at the level that it shows: what its own
         noise does to that averages out over the pixels. Of a colour sensor it is raw pixels that are independent; one
-        beside the pixels counts at the level of those that it is a part of.
+        beside the pixels counts at the level of those that it is a part of. What rows and columns share comes last.
 
         Parameters
         ----------
@@ -130,11 +132,21 @@ class Optics:
         colour = self.colour
         if colour is None:
             variance = self.noise_at(levels)
-            return rows, self.noise_variance if variance is None else variance
+            variance = self.noise_variance if variance is None else variance
+            return self._with_shared(rows, pixels, variance) if self.sensor.is_shared else (rows, variance)
         taken, found = by_raw(colour, pixels, self.shape)
         used = levels @ taken.multiply(1 / taken.sum(0)[None]).tocsr() if colour.interpolates else levels
         made = (rows.reshape(-1, rows.shape[-1]) @ taken).reshape(*rows.shape[:-1], len(found))
         return made, raw_variance(self.noise, used, found, self.shape[1])
+
+    def _with_shared(
+        self, rows: np.ndarray, pixels: np.ndarray, variance: np.ndarray | float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        parts, known = shared(self.sensor, pixels, self.shape[1])
+        variance = np.broadcast_to(variance, (*np.shape(variance)[:-1], len(pixels)))
+        own = np.broadcast_to(known, (*variance.shape[:-1], len(known)))
+        sums = (rows.reshape(-1, len(pixels)) @ parts).reshape(*rows.shape[:-1], len(known))
+        return np.concatenate([rows, sums], -1), np.atleast_2d(np.concatenate([variance, own], -1))
 
     def has_room(self, places: np.ndarray) -> np.ndarray:
         """Whether a locator that stands at places (m, 2) looks at the image alone, bool (m,)."""

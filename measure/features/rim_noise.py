@@ -16,6 +16,7 @@ from scipy import sparse
 from scipy.ndimage import binary_dilation
 
 from imaging.colour import by_raw, raw_variance
+from imaging.row_noise import shared
 from measure.features.optics import Optics
 
 _DRAWN, _AT_ONCE = 128, 16  # images; both variances are of the same noise: their ratio is known better than each
@@ -97,7 +98,12 @@ def _noise_of(clean: np.ndarray, region: np.ndarray, optics: Optics) -> tuple[sp
     level, colour = clean.ravel()[region], optics.colour
     if colour is None:
         variance = optics.noise_at(level)
-        return None, np.sqrt(np.full(region.size, optics.noise_variance) if variance is None else variance)
+        sigma = np.sqrt(np.full(region.size, optics.noise_variance) if variance is None else variance)
+        if not optics.sensor.is_shared:
+            return None, sigma
+        parts, known = shared(optics.sensor, region, clean.shape[1])
+        own = sparse.eye_array(region.size, format="csr")
+        return sparse.hstack([own, parts], format="csr"), np.concatenate([sigma, np.sqrt(known)])
     taken, raw = by_raw(colour, region, clean.shape)
     return taken, np.sqrt(raw_variance(optics.noise, clean.ravel()[raw], raw, clean.shape[1]))
 

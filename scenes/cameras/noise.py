@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from scenes.cameras.colour import Colour
 from scenes.model import Model
-from scenes.ranges import Darkness, NotNegative, Trace
+from scenes.ranges import Darkness, NotNegative, Spread, Trace
 
 
 class Noise(Model):
@@ -20,6 +20,10 @@ class Noise(Model):
     """Levels are rounded and clipped to 0 .. 2^bits - 1; left out: real numbers."""
     gain: NotNegative = 0.0
     """Makes shot noise of variance gain x (level - dark_level) [grey levels an electron]."""
+    row_sigma: Spread = 0.0
+    """Beside ``sigma``: what all pixels of a row share in one picture, as read-out noise does [grey levels]."""
+    column_sigma: Spread = 0.0
+    """The same of columns [grey levels]."""
     dark_level: Darkness = 0.0
     """Level of darkness, which keeps noise from being cut off at 0 [grey levels]."""
     prnu: NotNegative = 0.0
@@ -31,9 +35,25 @@ class Noise(Model):
     colour: Colour | None = None
     """Colour filters on the pixels, whose raw noise all other keys then tell; left out: a monochrome sensor."""
 
+    @model_validator(mode="after")
+    def _check_shared(self) -> Noise:
+        if self.is_shared and self.colour is not None:
+            raise ValueError(
+                f"row_sigma and column_sigma must be 0 with colour filters, got {self.row_sigma:g} and "
+                f"{self.column_sigma:g}"
+            )
+        return self
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether pixels of a row or of a column have noise in common."""
+        return self.row_sigma > 0 or self.column_sigma > 0
+
     @property
     def variance(self) -> float:
         """Variance of a grey level in darkness, rounding included (1/12 of a squared grey level).
+
+        What rows and columns share is beside it (`imaging.row_noise`).
 
         With colour filters that of white noise which moves an edge as much (`Colour.noise_factor`).
         """

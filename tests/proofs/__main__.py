@@ -21,6 +21,7 @@ from tests.proofs.hollow import hollow
 from tests.proofs.installed import installed
 from tests.proofs.kill import kill
 from tests.proofs.kinds import kinds
+from tests.proofs.known_sizes import known_sizes
 from tests.proofs.large import large
 from tests.proofs.lights import lights
 from tests.proofs.limbs import limbs
@@ -32,6 +33,7 @@ from tests.proofs.photographs import photographs
 from tests.proofs.processed import processed
 from tests.proofs.rate import rate
 from tests.proofs.real_noise import real_noise
+from tests.proofs.shots import shots
 from tests.proofs.stations import stations
 from tests.proofs.telecentric import telecentric
 from tests.proofs.uneven import uneven
@@ -56,6 +58,7 @@ app.command()(hollow)
 app.command()(installed)
 app.command()(kill)
 app.command()(kinds)
+app.command()(known_sizes)
 app.command()(large)
 app.command()(lights)
 app.command()(limbs)
@@ -70,6 +73,7 @@ app.command()(real_noise)
 app.command()(uneven)
 app.command()(usable)
 app.command()(varied)
+app.command()(shots)
 app.command()(stations)
 app.command()(telecentric)
 

@@ -1,4 +1,4 @@
-"""``ice calibrate-camera``: intrinsics and distortion from photographs of a chessboard, with their covariance."""
+"""``ice calibrate-camera``: intrinsics and distortion from photographs of a board, with their covariance."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ _LONGEST = 1e9
 class Options:
     """What a calibration is asked for."""
 
-    boards: Annotated[list[Path], typer.Argument(metavar="BOARD...", help="Photographs of one chessboard, 3 or more.")]
-    square: Annotated[float, typer.Option(metavar="LENGTH", help="Side of the board's squares.")]
+    boards: Annotated[list[Path], typer.Argument(metavar="BOARD...", help="Photographs of one board, 3 or more.")]
+    square: Annotated[float, typer.Option(metavar="LENGTH", help="Side of the board's squares; from dot to dot.")]
     square_sd: Annotated[float, typer.Option(help="Its standard uncertainty, the same for all squares.")] = 0.0
     units: Annotated[str, typer.Option(help="Of the squares and of the poses: mm, cm, m, inch.")] = "mm"
     shape: Annotated[
-        str | None, typer.Option(metavar="9x6", help="Inner corners: columns x rows; counted when not given.")
+        str | None, typer.Option(metavar="9x6", help="Inner corners, or dots: columns x rows; counted when not given.")
     ] = None
+    dots: Annotated[bool, typer.Option(help="The board is a grid of dots, not a chessboard.")] = False
     model: Annotated[
         str, typer.Option(help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none.")
     ] = "k1,k2,p1,p2,k3"
@@ -50,7 +51,7 @@ class Options:
 @commands.command("calibrate-camera")
 @taking(Options)
 def calibrate_camera_command(given: Options) -> None:
-    """Calibrate a camera from photographs of a chessboard seen from different directions.
+    """Calibrate a camera from photographs of a chessboard or a grid of dots, seen from different directions.
 
     -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
     boards do not determine the focal length.
@@ -67,7 +68,7 @@ def calibrate_camera_command(given: Options) -> None:
     camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
         size = camera and Size(camera.height, camera.width, scene)
-        seen = read_boards(given.boards, wanted, given.noise, shown, size)
+        seen = read_boards(given.boards, wanted, given.noise, shown, size, dots=given.dots)
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
     found = measure.calibrate_camera(seen.boards, given.square, seen.image_shape, given.model, given.square_sd)

@@ -22,7 +22,7 @@ COMMANDS = {
     "scenes": ("scene", "List the bundled scenes."),
     "effects": ("effects", "Which effects a scene calls for, why, their influence and cost."),
     "calibrate": ("calibrate", "Measure the position noise of every locator."),
-    "calibrate-camera": ("calibrate_camera", "Calibrate a camera from photographs of a chessboard."),
+    "calibrate-camera": ("calibrate_camera", "Calibrate a camera from photographs of a board."),
     "budget": ("budget", "The uncertainty of every measurand: all sources, shares, and U = k u."),
     "catalogue": ("catalogue", "Check a catalogue of sensors, lenses and lights for contradictions."),
     "design": ("design", "Which camera, lens and light to buy for a drawing's tolerances, at the least cost."),

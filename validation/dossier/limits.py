@@ -14,8 +14,9 @@ LIMITS = (
     ("Lens", "Distortion, fall of brightness and blur over the field are those that the scene states; what it does not "
      "state is missing, and the uncertainty of the distortion is that of its model's numbers.",
      "calibrate with the board where the part is (`ice calibrate-camera`)"),
-    ("Noise", "EMVA 1288's linear model: dark noise, shot noise, fixed pattern, rounding, independent from pixel to "
-     "pixel until a colour mosaic is filled in, and the same in every row and column.",
+    ("Noise", "EMVA 1288's linear model: dark noise, shot noise, fixed pattern, rounding, independent from "
+     "pixel to pixel but for what rows and columns share as stated (`row_sigma`, `column_sigma`), and until a colour "
+     "mosaic is filled in.",
      "photographs whose noise is correlated get the status `correlated`; estimate the noise of your own camera"),
     ("Motion and time", "A part that moves is sheared by a rolling shutter as the scene states, and not smeared; "
      "nothing drifts between pictures but what the scene states.",
