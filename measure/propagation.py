@@ -19,7 +19,7 @@ from measure.estimators.separate import SeparateEstimator
 from measure.features import arranged
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response, tells_errors
-from measure.features.shape import prepared
+from measure.features.shape import prepared, torn
 from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
 from measure.quantities import MeasuredFeatures, find
 from measure.unevenness import Unevenness
@@ -197,7 +197,8 @@ def _of_lines(
     threshold: float | None,
 ) -> sparse.csr_array:
     """Of the lines, (2 E, pixels); NaN where there is none."""
-    tool = prepared(layout, estimator, picture.scene.locator.thresholds[0] if threshold is None else threshold)
+    limit = picture.scene.locator.thresholds[0] if threshold is None else threshold
+    tool = prepared(layout, estimator, limit)
     if isinstance(tool, ArrangementEstimator):
         counted = np.isin(found.shape.counted[0], status.MEASURED)
         if str(found.shape.whole[0]) not in status.MEASURED or not counted.any():
@@ -211,6 +212,7 @@ def _of_lines(
         else:
             near = tool.respond_within(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
+    measured &= ~torn(clean, layout, estimator, limit)
     near[np.repeat(~measured, 2)] = np.nan
     if not tool.pixels.size:
         return _none(len(near), clean.size)

@@ -26,6 +26,8 @@ _PASSES = 6
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 _KEPT = 64  # estimators
 _TOOLS: OrderedDict[tuple[int, str, float], Estimator | ArrangementEstimator] = OrderedDict()
+_DOUBT = 4.0  # standard deviations from that reach within which noise may take an edge to either side of it
+_ELSEWHERE = 0.3  # of a standard deviation, that `ok` allows a bias
 _LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
 
 
@@ -86,10 +88,8 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
     calipers = tool.calipers
     if any(caliper.status not in status.MEASURED for caliper in calipers):
         return shape
-    lengths = np.array([caliper.length for caliper in calipers])
-    offsets = np.stack([estimate.level, estimate.level + estimate.slope * lengths], -1)
-    limit = np.maximum(ESTIMATORS[name].capture_px, 5 * _end_errors(lines, lengths))
-    far = ~(np.abs(offsets) <= limit).all((1, 2))
+    offsets, errors = _at_ends(tool, estimate, lines)
+    far = ~(np.abs(offsets) <= _capture(name, errors)).all((1, 2))
     lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
     if not far.any() or passes == 0:
         return _refuse(shape, far)
@@ -100,6 +100,39 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
         source[which], rows[which] = len(parts), np.arange(len(which))
         parts.append(_find(images[which], move, name, threshold, passes - 1))
     return gather(parts, source, rows)
+
+
+def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float) -> np.ndarray:
+    """Of which edges noise decides from where they are looked for, and with it where they are found, bool (E,).
+
+    In a noise-free image (height, width) whose edges lie about as far from their expected places as an estimator
+    reaches, by far less than noise moves them.
+    """
+    tool, images = prepared(layout, name, threshold), clean[None]
+    estimate = tool.estimate(images)
+    offsets, errors = _at_ends(tool, estimate, tool.covariance(estimate, images))
+    with np.errstate(invalid="ignore"):
+        doubtful = np.abs(np.abs(offsets) - _capture(name, errors)) < _DOUBT * errors
+    if not doubtful.any() or any(caliper.status not in status.MEASURED for caliper in tool.calipers):
+        return np.zeros(len(layout.names), bool)
+    key = np.round(np.clip(offsets[0], -1, 1) / _GRID) * _GRID
+    other = _find(images, _shifted(layout, tuple(key.ravel().tolist())), name, threshold, 0)
+    ends = np.array([caliper.at(np.array([0.0, caliper.length]), np.zeros(2)) for caliper in tool.calipers])
+    there = np.einsum("ei,eki->ek", other.normals[0], other.points[0][:, None] - ends)
+    with np.errstate(invalid="ignore"):
+        return ~(np.abs(there - offsets[0]) <= _ELSEWHERE * errors[0]).all(-1)
+
+
+def _at_ends(tool: Estimator, estimate: Estimate, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far each line lies from its expected edge at both ends, px, and standard deviations, (n, E, 2) each."""
+    lengths = np.array([caliper.length for caliper in tool.calipers])
+    offsets = np.stack([estimate.level, estimate.level + estimate.slope * lengths], -1)
+    return offsets, _end_errors(lines, lengths)
+
+
+def _capture(name: str, errors: np.ndarray) -> np.ndarray:
+    """Up to which offsets lines are taken from where they are expected, (n, E, 2)."""
+    return np.maximum(ESTIMATORS[name].capture_px, 5 * errors)
 
 
 def _expectations(images, layout, offsets, far, lost, first):
