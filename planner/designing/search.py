@@ -25,7 +25,7 @@ from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, Viewed, floo
 from planner.designing.stations import station
 from scenes import InvalidInput, Scene
 from scenes.cameras.pinhole import MOST_PIXELS
-from scenes.catalogue import Catalogue, Entry, ListedLens, ListedSensor
+from scenes.catalogue import Catalogue, Entry, ListedLens, ListedLight, ListedSensor
 
 Report = Callable[[str, int, int], None]
 CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, LARGE, BUDGET, DOMINATED = (
@@ -138,6 +138,8 @@ class Design:
     searched : Tally
     priced : bool
         Whether costs are prices.
+    lights : tuple of ListedLight
+        That were left to choose from, by price.
     """
 
     problem: Problem
@@ -146,6 +148,7 @@ class Design:
     front: tuple[Offer, ...]
     searched: Tally
     priced: bool
+    lights: tuple[ListedLight, ...] = ()
 
     @property
     def scene(self) -> Scene:
@@ -429,7 +432,7 @@ class _Search:
             len(self.sensors) * len(self.lenses), {why: n for why, n in self.out.items() if n},
             self.counts["views"], self.counts["rated"], self.counts["close"], complete,
         )  # fmt: skip
-        return Design(self.problem, best, winner is not None, front, searched, catalogue.priced)
+        return Design(self.problem, best, winner is not None, front, searched, catalogue.priced, tuple(self.lights))
 
     def _looked_front(self) -> tuple[Offer, ...]:
         """The front of what was rated, each of it looked at closely."""
