@@ -38,7 +38,7 @@ _TOGETHER = 16  # pairs whose views are found at a time
 _BETTER = 0.98  # of the ratio before: what is worth more cost
 _SHOWN = 12  # of the front
 _MOST_ASIDE = 16384  # columns or rows, of a scene's camera
-_LOOKS = 24  # close looks for it at most
+_LOOKS, _SIDE_BY_SIDE = 24, 2  # close looks for it at most, and at a time
 _SURE = 0.5  # of a noise that another camera's picture tells
 _OF_RATING = ("visibility", "light in the way", "exposure time", "depth of field", "light", "rolling shutter")
 
@@ -386,10 +386,11 @@ class _Search:
             return None
         return close
 
-    def _look(self, offer: Offer) -> Offer | None:
+    def _look(self, offer: Offer, looked: Close | None = None) -> Offer | None:
         """An offer looked at closely; None where another camera already showed that its light does not do.
 
-        Noise of the same picture is less by no more than the cameras' least noises tell, within a factor 2.
+        Noise of the same picture is less by no more than the cameras' least noises tell, within a factor 2. ``looked``
+        is what a look tells, where it was done.
         """
         if offer.close is not None:
             return offer
@@ -399,7 +400,7 @@ class _Search:
             return None
         self.counts["close"] += 1
         self.report("close looks", self.counts["close"], self.counts["close"] + 1)
-        close = replace(offer, close=look(self.problem, offer.rated))
+        close = replace(offer, close=looked or look(self.problem, offer.rated))
         hard = _SURE * close.close.noise / max(offer.least, 1e-12) if close.close.noise > 1 else 0.0
         self.hard[offer.shape] = min(hard, self.hard.get(offer.shape, math.inf))
         self.offers = [close if each is offer else each for each in self.offers]
@@ -436,12 +437,14 @@ class _Search:
 
     def _looked_front(self) -> tuple[Offer, ...]:
         """The front of what was rated, each of it looked at closely."""
-        for _ in range(_LOOKS):
+        for _ in range(_LOOKS // _SIDE_BY_SIDE):
             front = tuple(_front(self.offers))
-            open_ones = [each for each in front if each.close is None]
+            open_ones = [each for each in front if each.close is None][-_SIDE_BY_SIDE:]
             if not open_ones:
                 return front
-            self._look(open_ones[-1])
+            looked = self.mapped(partial(look, self.problem), [each.rated for each in open_ones])
+            for offer, close in zip(open_ones, looked, strict=True):
+                self._look(offer, close)
         return tuple(_front([offer for offer in self.offers if offer.close is not None]))
 
 
