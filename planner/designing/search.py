@@ -34,7 +34,7 @@ CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, LARGE, BUDGET, DOMINATED = (
 PLACES = "places in the image"
 MOST_RATED = 20_000  # pairs that are rated at most, before the search gives up
 _BESIDE = 24  # pairs that are rated for the front beyond the cheapest that does
-_TOGETHER = 16  # pairs whose views are found at a time
+_TOGETHER, _LIGHTS_TOGETHER = 16, 8  # pairs whose views are found at a time, and lights that a pair is rated with
 _BETTER = 0.98  # of the ratio before: what is worth more cost
 _SHOWN = 12  # of the front
 _MOST_ASIDE = 16384  # columns or rows, of a scene's camera
@@ -241,6 +241,7 @@ class _Search:
         self.offers: list[Offer] = []
         self.hard: dict[tuple, float] = {}  # of a light's shape: least factor of noise over the bound of its pair
         self.seen: dict[int, tuple[Viewed, ...] | str] = {}
+        self.ahead: dict[tuple[int, int], Rated | str] = {}  # of pairs and numbers of lights
         self.counts: Counter = Counter()
         self.out: Counter = Counter()
 
@@ -349,7 +350,7 @@ class _Search:
     def _rated(self, queue: list, at: tuple[float, float, int, int], seen: tuple, beaten: bool) -> Offer | None:
         cost, least, pair, number = at
         self.counts["rated"] += 1
-        found = rate_light(self.problem, *self._parts(pair), self.lights[number], seen)
+        found = self._rate(pair, number, seen)
         offer = None if isinstance(found, str) else Offer(cost, found, order=(pair, number), least=least)
         if offer is None:
             self.counts[found] += 1
@@ -363,6 +364,14 @@ class _Search:
             if more <= (self.problem.wishes.budget or math.inf):
                 heapq.heappush(queue, (more, least, pair, number + 1))
         return offer
+
+    def _rate(self, pair: int, number: int, seen: tuple[Viewed, ...]) -> Rated | str:
+        """Of a pair and a light; where the first light does not do, those of the next ones are found with it."""
+        if (pair, number) not in self.ahead:
+            last = number + 1 if number == 0 else min(number + _LIGHTS_TOGETHER, len(self.lights))
+            made = self.mapped(partial(_rated, self.problem, self._parts(pair), seen), self.lights[number:last])
+            self.ahead |= {(pair, number + k): each for k, each in enumerate(made)}
+        return self.ahead.pop((pair, number))
 
     def _closest(self, passing: list[Offer]) -> Offer | None:
         """The first, by preference, that meets all when it is looked at closely."""
@@ -450,6 +459,12 @@ class _Search:
 
 def _viewed(problem: Problem, parts: tuple[ListedSensor, ListedLens]) -> tuple[Viewed, ...] | str:
     return views(problem, *parts)
+
+
+def _rated(
+    problem: Problem, parts: tuple[ListedSensor, ListedLens], seen: tuple[Viewed, ...], light: ListedLight
+) -> Rated | str:
+    return rate_light(problem, *parts, light, seen)
 
 
 def _front(offers: list[Offer]) -> Iterator[Offer]:

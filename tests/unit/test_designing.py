@@ -11,6 +11,7 @@ import pytest
 
 import scenes
 from imaging.geometry.projection import project
+from planner.designing import alternatives
 from planner.designing.bounds import NOISE, REASONS, pairs
 from planner.designing.close import look
 from planner.designing.dominance import of_light, of_sensor, undominated
@@ -269,6 +270,7 @@ def test_what_cannot_be_signed_is_tried_from_elsewhere_first(monkeypatch: pytest
             return SimpleNamespace(offer=each, trusted=signed, holds=each.rated.sensor != offer.rated.sensor)
 
         monkeypatch.setattr(designed, "prove", stood_in)
+        monkeypatch.setattr(alternatives, "look", lambda *_: SimpleNamespace(ratio=0.5))
         best, tried = designed.proven(given, 0)
         assert best.best.rated.sensor == tried[-1].offer.rated.sensor or not tried[-1].holds
         return [tuple(each.offer.rated.sensor) for each in tried]
