@@ -213,8 +213,8 @@ class _Tracer:
         """Of fine pixels, in scalar variants."""
         size, crop = self.film(divided)
         seen = view(self.mitsuba, self.picture, active, size, crop, rays) | {"sampler": {"type": sampler}}
-        if self.quality.alike and divided == 1:
-            seen["sampler"] = {"type": "stratified", "jitter": False}
+        if self.quality.alike and divided == 1 and "light_size" not in active:
+            seen["sampler"] = {"type": "stratified", "jitter": False}  # of a light's faces it would find a few alone
         sight = Sight.of(self.picture, active, self.quality.supersample // divided)
         return Tiles(self.mitsuba, loaded, seen, (crop[0].start, crop[1].start), sight)
 

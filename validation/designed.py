@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import scenes
 from planner.budgeting.budgets import SceneBudget
+from planner.designing.alternatives import alternatives
 from planner.designing.search import Design, Offer
 from planner.designing.stations import station
 from scenes import InvalidInput, Picture, Scene
@@ -21,7 +23,7 @@ from validation.budgets import budget_of
 if TYPE_CHECKING:
     from validation.batch.result import Validation
 
-_TRIED = 3  # stations that are rendered, where rendering contradicts the ones before
+_TRIED, _OTHERS = 3, 2  # pairs of camera and lens that are rendered, and other places and lights for each
 _DERIVED = ("distance", "focal_px")  # of a camera's data sheet
 
 
@@ -81,20 +83,29 @@ def prove(design: Design, offer: Offer, renders: int, report: Any = None) -> Sta
 
 
 def proven(design: Design, renders: int, report: Any = None) -> tuple[Design, tuple[StationProof, ...]]:
-    """The design with the first station that rendering bears out: the best, or the next of the front that meet all.
+    """The design with the first station that rendering bears out.
 
+    The best, then the next of the front that meet all. Where values of one cannot be signed, what lies beside their
+    edges depends on light and place more than is known: other places and lights for its camera and lens come first.
     Without any the design stays as it is, and its proofs say so.
     """
-    if design.best is None:
-        return design, ()
-    dearer = [each for each in design.front if each.cost >= design.best.cost and each.ratio <= 1]
-    tried = [design.best, *(each for each in dearer if each.rated is not design.best.rated)][:_TRIED]
     proofs: list[StationProof] = []
-    for offer in tried:
+    for offer in _members(design)[:_TRIED]:
         proofs.append(prove(design, offer, renders, report))
+        others = iter(()) if proofs[-1].trusted else islice(alternatives(design, offer), _OTHERS)
+        while not proofs[-1].holds and (other := next(others, None)) is not None:
+            proofs.append(prove(design, other, renders, report))
         if proofs[-1].holds:
-            return replace(design, best=offer), tuple(proofs)
+            return replace(design, best=proofs[-1].offer), tuple(proofs)
     return design, tuple(proofs)
+
+
+def _members(design: Design) -> list[Offer]:
+    """The best, and the next of the front that meet all, by cost."""
+    if design.best is None:
+        return []
+    dearer = [each for each in design.front if each.cost >= design.best.cost and each.ratio <= 1]
+    return [design.best, *(each for each in dearer if each.rated is not design.best.rated)]
 
 
 def write(design: Design, source: str, path: Path) -> Scene:

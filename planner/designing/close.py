@@ -61,15 +61,15 @@ def look(problem: Problem, rated: Rated) -> Close:
         picture = Picture.of(scene, rated.sensor, rated.light)
     except InvalidInput:
         return Close((), (NOT_VISIBLE,) * len(problem.allowed), np.inf, 0)
-    pictures = replace(Pictures.of(picture), closely=True, _known={})
+    pictures = replace(Pictures.of(picture), closely=True, roughly=True, _known={})
     pictures.once("emitters", lambda: emitters(scene, pictures.lights, nodes))
     evaluated = variance_model("calibrated")(pictures)
     noise = evaluated.variances_object
     if not np.isfinite(noise).all():
         states = tuple("ok" if np.isfinite(v) else NOT_VISIBLE for v in noise)
         return Close((), states, np.inf, int(noise.argmax()))
-    off, clutter = bias(pictures), cluttered(pictures)
-    told = forecasts(scene, evaluated, clutter, (off.values, off.values_object))
+    clutter, off = _biases(pictures, len(noise))
+    told = forecasts(scene, evaluated, clutter, off)
     given = sources(scene)
     with np.errstate(all="ignore"):
         slopes = sensitivities(Features(pictures), given, biased=False)
@@ -88,6 +88,19 @@ def look(problem: Problem, rated: Rated) -> Close:
     return Close(tuple(budgets), tuple(_known(each.status, scene) for each in told), ratio, worst, alone)
 
 
+def _biases(pictures: Pictures, count: int) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Which edges are cluttered, and biases of the quantities in image and object; not known where a render tells."""
+    if not _is_told(pictures.scene):
+        return np.array(False), (np.full(count, np.nan), np.full(count, np.nan))
+    off = bias(pictures)
+    return cluttered(pictures), (off.values, off.values_object)
+
+
+def _is_told(scene: Scene) -> bool:
+    """Whether formulas tell biases; else a render has to: they do not know how those move with light and surfaces."""
+    return is_plain(scene) and not scene.textures
+
+
 def _known(state: str, scene: Scene) -> str:
-    """``clutter`` where a render has to tell the bias: formulas do not know how it moves with light and surfaces."""
-    return state if state != OK or (is_plain(scene) and not scene.textures) else CLUTTER
+    """``clutter`` where a render has to tell the bias."""
+    return state if state != OK or _is_told(scene) else CLUTTER

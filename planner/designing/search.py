@@ -25,7 +25,7 @@ from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, Viewed, floo
 from planner.designing.stations import station
 from scenes import InvalidInput, Scene
 from scenes.cameras.pinhole import MOST_PIXELS
-from scenes.catalogue import Catalogue, Entry, ListedLens, ListedSensor
+from scenes.catalogue import Catalogue, Entry, ListedLens, ListedLight, ListedSensor
 
 Report = Callable[[str, int, int], None]
 CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, LARGE, BUDGET, DOMINATED = (
@@ -34,11 +34,11 @@ CONTRADICTORY, INCOMPLETE, PRICELESS, COLOUR, LARGE, BUDGET, DOMINATED = (
 PLACES = "places in the image"
 MOST_RATED = 20_000  # pairs that are rated at most, before the search gives up
 _BESIDE = 24  # pairs that are rated for the front beyond the cheapest that does
-_TOGETHER = 16  # pairs whose views are found at a time
+_TOGETHER, _LIGHTS_TOGETHER = 16, 8  # pairs whose views are found at a time, and lights that a pair is rated with
 _BETTER = 0.98  # of the ratio before: what is worth more cost
 _SHOWN = 12  # of the front
 _MOST_ASIDE = 16384  # columns or rows, of a scene's camera
-_LOOKS = 24  # close looks for it at most
+_LOOKS, _SIDE_BY_SIDE = 24, 2  # close looks for it at most, and at a time
 _SURE = 0.5  # of a noise that another camera's picture tells
 _OF_RATING = ("visibility", "light in the way", "exposure time", "depth of field", "light", "rolling shutter")
 
@@ -138,6 +138,8 @@ class Design:
     searched : Tally
     priced : bool
         Whether costs are prices.
+    lights : tuple of ListedLight
+        That were left to choose from, by price.
     """
 
     problem: Problem
@@ -146,6 +148,7 @@ class Design:
     front: tuple[Offer, ...]
     searched: Tally
     priced: bool
+    lights: tuple[ListedLight, ...] = ()
 
     @property
     def scene(self) -> Scene:
@@ -238,6 +241,7 @@ class _Search:
         self.offers: list[Offer] = []
         self.hard: dict[tuple, float] = {}  # of a light's shape: least factor of noise over the bound of its pair
         self.seen: dict[int, tuple[Viewed, ...] | str] = {}
+        self.ahead: dict[tuple[int, int], Rated | str] = {}  # of pairs and numbers of lights
         self.counts: Counter = Counter()
         self.out: Counter = Counter()
 
@@ -346,7 +350,7 @@ class _Search:
     def _rated(self, queue: list, at: tuple[float, float, int, int], seen: tuple, beaten: bool) -> Offer | None:
         cost, least, pair, number = at
         self.counts["rated"] += 1
-        found = rate_light(self.problem, *self._parts(pair), self.lights[number], seen)
+        found = self._rate(pair, number, seen)
         offer = None if isinstance(found, str) else Offer(cost, found, order=(pair, number), least=least)
         if offer is None:
             self.counts[found] += 1
@@ -360,6 +364,14 @@ class _Search:
             if more <= (self.problem.wishes.budget or math.inf):
                 heapq.heappush(queue, (more, least, pair, number + 1))
         return offer
+
+    def _rate(self, pair: int, number: int, seen: tuple[Viewed, ...]) -> Rated | str:
+        """Of a pair and a light; where the first light does not do, those of the next ones are found with it."""
+        if (pair, number) not in self.ahead:
+            last = number + 1 if number == 0 else min(number + _LIGHTS_TOGETHER, len(self.lights))
+            made = self.mapped(partial(_rated, self.problem, self._parts(pair), seen), self.lights[number:last])
+            self.ahead |= {(pair, number + k): each for k, each in enumerate(made)}
+        return self.ahead.pop((pair, number))
 
     def _closest(self, passing: list[Offer]) -> Offer | None:
         """The first, by preference, that meets all when it is looked at closely."""
@@ -383,10 +395,11 @@ class _Search:
             return None
         return close
 
-    def _look(self, offer: Offer) -> Offer | None:
+    def _look(self, offer: Offer, looked: Close | None = None) -> Offer | None:
         """An offer looked at closely; None where another camera already showed that its light does not do.
 
-        Noise of the same picture is less by no more than the cameras' least noises tell, within a factor 2.
+        Noise of the same picture is less by no more than the cameras' least noises tell, within a factor 2. ``looked``
+        is what a look tells, where it was done.
         """
         if offer.close is not None:
             return offer
@@ -396,7 +409,7 @@ class _Search:
             return None
         self.counts["close"] += 1
         self.report("close looks", self.counts["close"], self.counts["close"] + 1)
-        close = replace(offer, close=look(self.problem, offer.rated))
+        close = replace(offer, close=looked or look(self.problem, offer.rated))
         hard = _SURE * close.close.noise / max(offer.least, 1e-12) if close.close.noise > 1 else 0.0
         self.hard[offer.shape] = min(hard, self.hard.get(offer.shape, math.inf))
         self.offers = [close if each is offer else each for each in self.offers]
@@ -429,21 +442,29 @@ class _Search:
             len(self.sensors) * len(self.lenses), {why: n for why, n in self.out.items() if n},
             self.counts["views"], self.counts["rated"], self.counts["close"], complete,
         )  # fmt: skip
-        return Design(self.problem, best, winner is not None, front, searched, catalogue.priced)
+        return Design(self.problem, best, winner is not None, front, searched, catalogue.priced, tuple(self.lights))
 
     def _looked_front(self) -> tuple[Offer, ...]:
         """The front of what was rated, each of it looked at closely."""
-        for _ in range(_LOOKS):
+        for _ in range(_LOOKS // _SIDE_BY_SIDE):
             front = tuple(_front(self.offers))
-            open_ones = [each for each in front if each.close is None]
+            open_ones = [each for each in front if each.close is None][-_SIDE_BY_SIDE:]
             if not open_ones:
                 return front
-            self._look(open_ones[-1])
+            looked = self.mapped(partial(look, self.problem), [each.rated for each in open_ones])
+            for offer, close in zip(open_ones, looked, strict=True):
+                self._look(offer, close)
         return tuple(_front([offer for offer in self.offers if offer.close is not None]))
 
 
 def _viewed(problem: Problem, parts: tuple[ListedSensor, ListedLens]) -> tuple[Viewed, ...] | str:
     return views(problem, *parts)
+
+
+def _rated(
+    problem: Problem, parts: tuple[ListedSensor, ListedLens], seen: tuple[Viewed, ...], light: ListedLight
+) -> Rated | str:
+    return rate_light(problem, *parts, light, seen)
 
 
 def _front(offers: list[Offer]) -> Iterator[Offer]:

@@ -4,25 +4,39 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import scenes
 from imaging.geometry.projection import project
+from planner.designing import alternatives
 from planner.designing.bounds import NOISE, REASONS, pairs
 from planner.designing.close import look
 from planner.designing.dominance import of_light, of_sensor, undominated
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, limit_ratio, rate, rate_light, views
 from planner.designing.optics import ROLLING, TIME, Focused, blur_um, chosen, focused
-from planner.designing.search import COLOUR, CONTRADICTORY, INCOMPLETE, LARGE, PRICELESS, design, usable
+from planner.designing.search import (
+    COLOUR,
+    CONTRADICTORY,
+    INCOMPLETE,
+    LARGE,
+    PRICELESS,
+    Design,
+    Offer,
+    Tally,
+    design,
+    usable,
+)  # fmt: skip
 from planner.designing.stations import carried, station
 from planner.designing.wishes import Wishes, allowed
 from planner.uncertainty.risks import Limits, global_risks
-from scenes import InvalidInput, Jitter, Uncertainty
+from scenes import InvalidInput, Jitter, Uncertainty, catalogue
 from scenes.cameras.covariance import Covariance
 from scenes.catalogue import Catalogue, ListedLens, ListedLight
 from tests.benchmarks.design import brute_force, synthetic
+from validation import designed
 
 
 @cache
@@ -237,3 +251,31 @@ def test_less_noise_and_smaller_pixels_are_no_worse() -> None:
                    {"resolution": (2560, 2048), "pixel_pitch_um": 2.25}):  # fmt: skip
         other = rate(problem, camera.model_copy(update=change), lens, light)
         assert (limit_ratio(problem, (other.U / problem.wishes.coverage) ** 2) <= rated.ratio * (1 + 1e-9)).all()
+
+
+def test_what_cannot_be_signed_is_tried_from_elsewhere_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rendering is stood in for: no value is signed at a setting's own place; then none is, or all with too large a U.
+
+    Other places and lights come where values are not signed, the next of the front where they are and U is too large.
+    """
+    problem, found = Problem.of(scenes.load("bracket_station"), Wishes(k=2.0)), catalogue.load("sample")
+    camera, lens = (next(each for each in some if name in each.name)
+                    for some, name in ((found.sensors, "C-240m"), (found.lenses, "FA5024")))  # fmt: skip
+    light = next(each for each in found.lights if "Flat Dome-100x100" in each.name)
+    offer = Offer(1.0, rate(problem, camera, lens, light))
+    given = Design(problem, offer, True, (offer,), Tally(1, 1, 1, {}, 1, {}, 1, 1, 1, True), False, (light,))
+
+    def proofs(signed: bool) -> list[tuple[float, float]]:
+        def stood_in(_: Design, each: Offer, *more: object) -> SimpleNamespace:
+            return SimpleNamespace(offer=each, trusted=signed, holds=each.rated.sensor != offer.rated.sensor)
+
+        monkeypatch.setattr(designed, "prove", stood_in)
+        monkeypatch.setattr(alternatives, "look", lambda *_: SimpleNamespace(ratio=0.5))
+        best, tried = designed.proven(given, 0)
+        assert best.best.rated.sensor == tried[-1].offer.rated.sensor or not tried[-1].holds
+        return [tuple(each.offer.rated.sensor) for each in tried]
+
+    own = tuple(offer.rated.sensor)
+    assert proofs(signed=True) == [own]
+    there, other = proofs(signed=False)
+    assert there == own != other

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 commands = commands()
 _MOST = 1e9
-_SEVERAL, _MANY = 2, 8  # processes, where there are as many cores; pieces of work that are worth them
+_SEVERAL, _MANY = 2, 8  # processes, where there are as many cores; pieces of work that are worth beginning them
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,8 @@ def _mapped() -> Iterator[Callable[..., Any]]:
         crews: list[Any] = []
 
         def mapped(function: Callable[..., Any], items: Sequence[Any]) -> Iterable[Any]:
-            if len(items) < _MANY or pool.cores() < _SEVERAL:
+            many = _SEVERAL if crews else _MANY
+            if len(items) < many or pool.cores() < _SEVERAL:
                 return map(function, items)
             if not crews:
                 crews.append(stack.enter_context(pool.local(_SEVERAL)))

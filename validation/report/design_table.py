@@ -22,7 +22,7 @@ def report(found: Design, currency: str, proofs: tuple[StationProof, ...], secon
         else f"at most {wishes.false_acceptance:g} of the parts wrongly accepted"
     )  # fmt: skip
     lines = [f"{scene.title or scene.name}: {asked} (T: half of the tolerance zone)"]
-    lines += _best(found, currency)
+    lines += _best(found, currency, rendered=bool(proofs))
     lines += [line for each in proofs for line in _proof(each)]
     parts = [Text("\n".join(lines)), _front(found, currency)]
     notes = [line for offer in _few(found) for line in _why(found, offer, currency)]
@@ -31,7 +31,7 @@ def report(found: Design, currency: str, proofs: tuple[StationProof, ...], secon
     return Group(*parts, Text("\n".join(notes)))
 
 
-def _best(found: Design, currency: str) -> list[str]:
+def _best(found: Design, currency: str, *, rendered: bool) -> list[str]:
     best = found.best
     if best is None:
         return ["Nothing of the catalogue measures all."]
@@ -55,7 +55,7 @@ def _best(found: Design, currency: str) -> list[str]:
         f"  light  {best.rated.names[2]}" + (f" at {settings.light_mm:.4g} mm" if settings.light_mm else "")
         + (f" {pose(best.rated.light)}" if best.rated.light else ""),
     ]  # fmt: skip
-    if opened:
+    if opened and not rendered:
         lines.append(f"  not signed yet: {', '.join(opened)}; their bias is told by rendering (--renders)")
     return lines
 
