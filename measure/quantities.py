@@ -82,7 +82,18 @@ class MeasuredFeatures:
     def adjustment(self) -> Adjustment | None:
         """Of the part's place in each image; None where it is known."""
         placing = self.known.placing
-        return None if placing is None else placing.adjusted(self.errors)
+        return None if placing is None else placing.adjusted(self.of_datums)
+
+    @cached_property
+    def of_datums(self) -> np.ndarray:
+        """Covariance (n, q, q) of lines and circles, infinite on the diagonal of those that are not measured."""
+        states = np.concatenate([self.shape.counted, *(c.state[:, None] for c in self.circles)], 1)
+        lost = np.zeros((len(self.status), self.seen.count), bool)
+        good, edges = np.isin(states.astype(str), status.MEASURED), len(self.names)
+        lost[:, : 2 * edges] = np.repeat(~good[:, :edges], 2, 1)
+        for c in range(len(self.circles)):
+            lost[:, self.seen.numbers(c)] = ~good[:, edges + c, None]
+        return np.where(lost[:, :, None] & np.eye(self.seen.count, dtype=bool), np.inf, self.errors)
 
     @cached_property
     def placement(self) -> np.ndarray:
@@ -170,7 +181,7 @@ def _placed_states(found: MeasuredFeatures) -> np.ndarray:
     """The statuses (n, M), with what the adjustment of the part's place says of its datums."""
     placing, quantities = found.known.placing, found.known.quantities
     at_known = values(found.seen, quantities, on_plane, found.errors).gradient
-    squares, freedom = placing.squares(found.errors, found.offsets)
+    squares, freedom = placing.squares(found.of_datums, found.offsets)
     fits = chdtrc(np.maximum(freedom, 1), squares) >= WORST  # less than expected is a datum_sd on the safe side
     variances = np.einsum("nmm->nm", found.plane.covariance)
     untold = found.adjustment.matters(at_known, variances, quantities) if placing.features else ~fits[:, None]

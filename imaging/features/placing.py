@@ -20,6 +20,8 @@ from scenes.placement import COMPONENTS, datums_of, prior
 from scenes.status import OF_SIGMA, OF_TOLERANCE
 
 _AROUND = 64  # points of a circle
+_ROUNDING = 1e-5  # of a feature's variance: lines that share corners leave no noise in some combinations, which tell
+# nothing of a placement, but for what noise has turned the lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,10 @@ class Placing:
         off = np.where(told, found, 0.0) - np.where(told[..., None], self.slopes, 0.0) @ self.expected
         off = np.nan_to_num(off) / size
         with_prior = scaled + slopes @ np.swapaxes(slopes, -1, -2)
-        return np.einsum("...q,...q->...", off, np.linalg.solve(with_prior, off[..., None])[..., 0]), told.sum(-1)
+        free = (
+            np.linalg.eigvalsh(np.where(told[..., :, None] & told[..., None, :], scaled, 0.0)) > 10 * _ROUNDING
+        ).sum(-1)
+        return np.einsum("...q,...q->...", off, np.linalg.solve(with_prior, off[..., None])[..., 0]), free
 
     def adjusted(self, errors: np.ndarray) -> Adjustment:
         """The adjustment of features whose noise has a covariance (..., q, q); infinite or NaN of what is not found."""
@@ -93,7 +98,7 @@ class Placing:
         size = np.sqrt(np.einsum("...qq->...q", whole))
         size = np.where(told & (size > 0), size, 1.0)
         scaled = whole / (size[..., :, None] * size[..., None, :])
-        scaled = scaled + np.where(told, 0.0, 1.0)[..., None] * np.eye(len(self.datums))
+        scaled = scaled + np.where(told, _ROUNDING, 1.0)[..., None] * np.eye(len(self.datums))
         return told, scaled, size, np.where(told[..., None], self.slopes, 0.0) / size[..., None]
 
 
@@ -167,7 +172,8 @@ class Adjustment:
     def matters(self, gradient: np.ndarray, variances: np.ndarray, quantities: tuple[Quantity, ...]) -> np.ndarray:
         """Whether what is `untold` is more than a bias may be, beside noise (..., M) and tolerances; bool (..., M)."""
         halves = np.array([0.0 if each.tolerance is None else each.tolerance.half for each in quantities])
-        return self.untold(gradient) > np.maximum(OF_SIGMA * np.sqrt(variances), OF_TOLERANCE * halves)
+        with np.errstate(invalid="ignore"):
+            return self.untold(gradient) > np.maximum(OF_SIGMA * np.sqrt(variances), OF_TOLERANCE * halves)
 
     def guilty(self, gradient: np.ndarray) -> str:
         """The component that has most of the direction which matters most to one value of one picture, by its
@@ -199,10 +205,10 @@ def _slopes(seen: Seen) -> np.ndarray:
 
 def _moved(seen: Seen, points: np.ndarray) -> np.ndarray:
     """Derivatives of the images of points (n, 3) by the placement, px, (..., n, 2, 6)."""
-    return seen.slopes(points) @ _steps(points, np.array(seen.camera.look_at))
+    return seen.slopes(points) @ steps(points, np.array(seen.camera.look_at))
 
 
-def _steps(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
+def steps(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
     """How points (n, 3) of a part move with its shift and turn about a pivot, (n, 3, 6)."""
     turned = np.cross(np.eye(3), (points - pivot)[:, None, :])  # (n, axis, 3)
     return np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), np.swapaxes(turned, 1, 2)], -1)
@@ -220,7 +226,7 @@ def _of_circle(seen: Seen, circle: Circle) -> np.ndarray:
     normal = np.stack([along[..., 1], -along[..., 0]], -1) / speed
     across = np.einsum("...ni,...nij->...nj", normal, slopes)
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
-    off = np.einsum("...nj,njk->...nk", across, _steps(points, np.array(seen.camera.look_at)))
+    off = np.einsum("...nj,njk->...nk", across, steps(points, np.array(seen.camera.look_at)))
     weighted = np.swapaxes(design * speed, -1, -2)
     return np.linalg.solve(weighted @ design, weighted @ off)
 
