@@ -24,6 +24,7 @@ from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.photograph import MeasuredShape, Shapes, photograph
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
+from measure.placement import Located, locate
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
 
@@ -41,6 +42,7 @@ __all__ = [
     "FittedField",
     "Images",
     "Intrinsics",
+    "Located",
     "MeasuredShape",
     "MeasuredValue",
     "Measurement",
@@ -65,6 +67,7 @@ __all__ = [
     "fit_ellipse",
     "fitted_field",
     "load_lens",
+    "locate",
     "measure",
     "measure_by",
     "measure_quadrilateral",

@@ -12,7 +12,7 @@ from imaging.placed import combined, placed
 from measure.estimators.registry import best_estimator
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.quantities import MeasuredFeatures, find
-from measure.registration import Candidate, candidates, rivals
+from measure.registration import Place, candidates, rivals
 from scenes import InvalidInput, Picture, Scene, status
 from scenes.arrays import picture as one_picture
 from scenes.placement import prior
@@ -28,7 +28,8 @@ class Located:
     Attributes
     ----------
     picture : Picture
-        The part where it lies, as `measure.measure` takes it; as the scene says where `status` is not ``ok``.
+        The part where it lies to a few hundredths of a px, as `measure.measure` takes it, which adjusts the rest; as
+        the scene says where `status` is not ``ok``.
     placement : ndarray, shape (6,)
         Shift along x, y and z, the scene's unit, and rotation vector about the point that the camera looks at,
         degrees.
@@ -95,7 +96,8 @@ def adjusted(
     First by the gradient locator, which needs no lights; then, in plain scenes, by the estimator that is meant, which
     may take levels from the lights.
     """
-    here, name = np.asarray(start, float), estimator or best_estimator(picture.scene)
+    here = before = np.asarray(start, float)
+    name = estimator or best_estimator(picture.scene)
     passes = [(DEFAULT_ESTIMATOR, False)]
     if name != DEFAULT_ESTIMATOR and is_plain(picture.scene) and picture.lights:
         passes.append((name, True))
@@ -106,12 +108,12 @@ def adjusted(
             step = _step(found, picture)
             if not np.isfinite(step).all() or not _told(found).any():
                 return _nowhere(picture, status.NOT_VISIBLE, "none of its datums is found", explained)
-            here = combined(here, step)
+            before, here = here, combined(here, step)
             if _moved(found) < _SETTLED:
                 break
         else:
             return _nowhere(picture, status.ILL_CONDITIONED, "its adjustment does not settle", explained)
-    return Located(placed(picture, here), here, _covariance(found, picture), status.OK, explained)
+    return Located(placed(picture, before), here, _covariance(found, picture), status.OK, explained)
 
 
 def _told(found: MeasuredFeatures) -> np.ndarray:
@@ -150,5 +152,5 @@ def _nowhere(picture: Picture, state: str, reason: str, explained: float) -> Loc
     return Located(picture, np.full(6, np.nan), np.diag(np.full(6, np.inf)), state, explained, reason)
 
 
-def _both(best: Candidate, other: Candidate) -> str:
+def _both(best: Place, other: Place) -> str:
     return f"two places explain the picture equally well: {best}, and {other}"

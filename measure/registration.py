@@ -29,7 +29,8 @@ _STEP = 2  # px of that picture between the shifts that are tried
 _ALIKE = 10.0  # degrees of a turn over which the same edges are taken to be seen
 _TURN = 2.0  # degrees between the turns that are tried
 _POINTS = 240  # of the model
-_KEPT, _ANGLES = 6, 3  # candidates that are refined, each at another place
+_KEPT, _REFINED = 6, 12  # places of a turn, and of all, that are refined
+_BEYOND = 1.25  # of what is plausible: where noise may take a place that is hardly told
 _APART = 3.0  # px of the coarse picture between two candidates
 _FIRST, _THEN = (24.0, 24.0, 8.0, 8.0), (8.0, 8.0, 3.0, 3.0, 3.0)  # px to both sides in which steps are sought
 _FEWER, _BEST = 4, 4  # the model's points are first so many times fewer; places that are looked at with all
@@ -41,7 +42,7 @@ _SPREAD = 0.5  # px: of a step's place
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class Place:
     """A place that may be the part's.
 
     Attributes
@@ -66,6 +67,10 @@ class Outline:
 
     points: np.ndarray
     along: np.ndarray
+
+    def thinned(self, fewer: int) -> Outline:
+        """Every so many of the points."""
+        return Outline(self.points[::fewer], self.along[::fewer])
 
     def seen(self, picture: Picture) -> tuple[np.ndarray, np.ndarray]:
         """Images of the points and unit normals of the edges there, px, (n, 2) each."""
@@ -108,7 +113,7 @@ def _evenly(length: float, step: float) -> np.ndarray:
     return (np.arange(count) + 0.5) / count
 
 
-def candidates(image: np.ndarray, picture: Picture) -> tuple[Candidate, ...]:
+def candidates(image: np.ndarray, picture: Picture) -> tuple[Place, ...]:
     """Places within the plausible ones that explain an image, the best first, no two alike.
 
     Parameters
@@ -120,26 +125,34 @@ def candidates(image: np.ndarray, picture: Picture) -> tuple[Candidate, ...]:
 
     Returns
     -------
-    tuple of Candidate
+    tuple of Place
         None where nothing is explained.
     """
     slopes = _Slopes.of(image, picture)
-    near = [_refined(slopes, picture, start, _FIRST, _FEWER) for start in _starts(image, picture)]
-    best = _different(picture, near)[:_BEST]
-    fine = _different(picture, [_refined(slopes, picture, each.placement, _THEN, 1) for each in best])
-    return tuple(each for each in fine if each.explained >= _LEAST)
+    near = [_refined(slopes, picture, start, _FIRST, model.thinned(_FEWER)) for start, model in _starts(image, picture)]
+    fine = [
+        _refined(slopes, picture, each.placement, _THEN, outline(placed(picture, each.placement)))
+        for each in _different(picture, near)[:_BEST]
+    ]
+    good = [each for each in fine if each.explained >= _LEAST and _is_plausible(picture, each.placement)]
+    return tuple(_different(picture, good))
 
 
-def _different(picture: Picture, found: list[Candidate]) -> list[Candidate]:
+def _different(picture: Picture, found: list[Place]) -> list[Place]:
     """The best first, none like one before."""
-    kept: list[Candidate] = []
+    kept: list[Place] = []
     for each in sorted(found, key=lambda one: -one.explained):
         if all(_shifts(picture, difference(each.placement, one.placement)) > _APART for one in kept):
             kept.append(each)
     return kept
 
 
-def rivals(found: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+def _is_plausible(picture: Picture, placement: np.ndarray) -> bool:
+    left = placement - np.array(picture.scene.placement.expected)
+    return bool((np.abs(left) <= _BEYOND * limits(picture.scene.uncertainty) + 1e-9).all())
+
+
+def rivals(found: tuple[Place, ...]) -> tuple[Place, ...]:
     """Those that explain a picture as well as the best does."""
     return tuple(each for each in found[1:] if 1 - each.explained <= (1 - found[0].explained) / _SAME + 0.01)
 
@@ -152,8 +165,9 @@ def _shifts(picture: Picture, placement: np.ndarray) -> float:
     return float(np.linalg.norm(moved, axis=-1).max())
 
 
-def _starts(image: np.ndarray, picture: Picture) -> list[np.ndarray]:
-    """Placements of shifts along the image and turns about the line of sight that lie best upon edges."""
+def _starts(image: np.ndarray, picture: Picture) -> list[tuple[np.ndarray, Outline]]:
+    """Placements of shifts along the image and turns about the line of sight that lie best upon edges, and what is seen
+    there."""
     shrink = max(1, min(image.shape) // _COARSE)
     near = _nearness(cv2.resize(image.astype(np.float32), None, fx=1 / shrink, fy=1 / shrink,
                                 interpolation=cv2.INTER_AREA))  # fmt: skip
@@ -172,9 +186,9 @@ def _starts(image: np.ndarray, picture: Picture) -> list[np.ndarray]:
         score = _score(near, (at + 0.5) / shrink - 0.5, normal, most)
         for y, x in _peaks(score):
             along = _STEP / scale * ((x - most[0]) * axes.right + (y - most[1]) * axes.down)
-            rows.append((score[y, x], np.concatenate([along, angle * axes.forward])))
+            rows.append((score[y, x], np.concatenate([along, angle * axes.forward]), model))
     rows.sort(key=lambda row: -row[0])
-    return [placement for score, placement in rows[: _KEPT * _ANGLES] if score > 0]
+    return [(placement, model) for score, placement, model in rows[:_REFINED] if score > 0]
 
 
 def _angles(most: float) -> np.ndarray:
@@ -259,11 +273,10 @@ def _bilinear(image: np.ndarray, places: np.ndarray) -> np.ndarray:
     return cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
 
 
-def _refined(slopes: _Slopes, picture: Picture, start: np.ndarray, reaches: tuple[float, ...], fewer: int) -> Candidate:
+def _refined(slopes: _Slopes, picture: Picture, start: np.ndarray, reaches: tuple[float, ...], model: Outline) -> Place:
     """The place near a start at which steps lie upon the model's edges, with what is known of it before."""
     here, u = start, prior(picture.scene.uncertainty)
     free = np.flatnonzero(u > 0)
-    model = outline(placed(picture, here), _POINTS // fewer)
     for reach in reaches:
         there = placed(picture, here)
         at, normal = model.seen(there)
@@ -275,7 +288,7 @@ def _refined(slopes: _Slopes, picture: Picture, start: np.ndarray, reaches: tupl
         here = combined(here, step)
     at, normal = model.seen(placed(picture, here))
     off, good = slopes.steps(at, normal, reaches[-1])
-    return Candidate(here, float((good & (np.abs(off) < _EXPLAINED)).mean()))
+    return Place(here, float((good & (np.abs(off) < _EXPLAINED)).mean()))
 
 
 def _rows(picture: Picture, points: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -20,8 +20,7 @@ from scenes.placement import COMPONENTS, datums_of, prior
 from scenes.status import OF_SIGMA, OF_TOLERANCE
 
 _AROUND = 64  # points of a circle
-_ROUNDING = 1e-5  # of a feature's variance: lines that share corners leave no noise in some combinations, which tell
-# nothing of a placement, but for what noise has turned the lines
+_NOISELESS = 1e-4  # of a feature's variance, in a combination of some; what is told of a placement has 3e-3 and more
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,35 +70,38 @@ class Placing:
 
     def squares(self, errors: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Chi-square (...) of what the best placement leaves of features found (..., q), and degrees of freedom."""
-        told, scaled, size, slopes = self._normal(errors)
-        off = np.where(told, found, 0.0) - np.where(told[..., None], self.slopes, 0.0) @ self.expected
-        off = np.nan_to_num(off) / size
-        with_prior = scaled + slopes @ np.swapaxes(slopes, -1, -2)
-        free = (
-            np.linalg.eigvalsh(np.where(told[..., :, None] & told[..., None, :], scaled, 0.0)) > 10 * _ROUNDING
-        ).sum(-1)
-        return np.einsum("...q,...q->...", off, np.linalg.solve(with_prior, off[..., None])[..., 0]), free
+        told, white = self._whitening(errors)
+        slopes = white @ self._told_slopes(told)
+        off = np.einsum("...iq,...q->...i", white, np.nan_to_num(np.where(told, found, 0.0))) - slopes @ self.expected
+        with_prior = np.eye(off.shape[-1]) + slopes @ np.swapaxes(slopes, -1, -2)
+        squares = np.einsum("...i,...i->...", off, np.linalg.solve(with_prior, off[..., None])[..., 0])
+        return squares, (white != 0).any(-1).sum(-1)
 
     def adjusted(self, errors: np.ndarray) -> Adjustment:
         """The adjustment of features whose noise has a covariance (..., q, q); infinite or NaN of what is not found."""
-        _, scaled, size, slopes = self._normal(errors)
-        weighted = np.linalg.solve(scaled, slopes)
-        information = np.swapaxes(slopes, -1, -2) @ weighted
+        told, white = self._whitening(errors)
+        slopes = white @ self._told_slopes(told)
+        information = np.swapaxes(slopes, -1, -2) @ slopes
         posterior = np.linalg.inv(information + np.eye(len(self.u)))
-        gain = posterior @ np.swapaxes(weighted / size[..., None], -1, -2)
-        return Adjustment(self, information, posterior, gain)
+        return Adjustment(self, information, posterior, posterior @ np.swapaxes(slopes, -1, -2) @ white)
 
-    def _normal(self, errors: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Which features tell (..., q), their correlation, the unit matrix of others (..., q, q), their standard
-        deviations (..., q), and slopes in units of those (..., q, k)."""
+    def _told_slopes(self, told: np.ndarray) -> np.ndarray:
+        return np.where(told[..., None], self.slopes, 0.0)
+
+    def _whitening(self, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which features tell (..., q), and combinations of them of variance 1 that are independent, (..., q, q).
+
+        Lines that share corners leave no noise in some combinations; these tell nothing of a placement, but for what
+        noise has turned the lines, and are left out as rows of zeros.
+        """
         told = self.datums & np.isfinite(np.einsum("...qq->...q", errors)) & np.isfinite(self.slopes).all(-1)
-        both = told[..., :, None] & told[..., None, :]
-        whole = np.where(both, errors + self.scatter, 0.0)
+        whole = np.where(told[..., :, None] & told[..., None, :], errors + self.scatter, 0.0)
         size = np.sqrt(np.einsum("...qq->...q", whole))
-        size = np.where(told & (size > 0), size, 1.0)
-        scaled = whole / (size[..., :, None] * size[..., None, :])
-        scaled = scaled + np.where(told, _ROUNDING, 1.0)[..., None] * np.eye(len(self.datums))
-        return told, scaled, size, np.where(told[..., None], self.slopes, 0.0) / size[..., None]
+        size = np.where(size > 0, size, 1.0)
+        values, vectors = np.linalg.eigh(whole / (size[..., :, None] * size[..., None, :]))
+        some = values > _NOISELESS
+        scale = np.where(some, 1 / np.sqrt(np.where(some, values, 1.0)), 0.0)
+        return told, scale[..., None] * np.swapaxes(vectors, -1, -2) / size[..., None, :]
 
 
 @dataclass(frozen=True, eq=False)
