@@ -8,6 +8,7 @@ the place before. What several places explain equally well is told.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -18,9 +19,9 @@ from imaging.features.rim_sides import seen_along
 from imaging.geometry.projection import camera_frame, facing, jacobian, project
 from imaging.geometry.visibility import boundaries, visible_spans
 from imaging.pictures import Pictures
-from imaging.placed import combined, difference, placed
+from imaging.placed import combined, difference, placed, turn, turn_vector
 from scenes import Picture
-from scenes.placement import limits, prior
+from scenes.placement import MOST_TILT, limits, prior
 
 _COARSE = 320  # px of the shorter side of the picture in which shifts are tried
 _BINS = 8  # directions of edges, over half a turn
@@ -29,14 +30,16 @@ _STEP = 2  # px of that picture between the shifts that are tried
 _ALIKE = 10.0  # degrees of a turn over which the same edges are taken to be seen
 _TURN = 2.0  # degrees between the turns that are tried
 _POINTS = 240  # of the model
-_KEPT, _REFINED = 6, 12  # places of a turn, and of all, that are refined
+_KEPT, _REFINED, _ALL_ROUND = 4, 12, 60  # places of a turn, of all small turns, and all the way round, that are refined
 _BEYOND = 1.25  # of what is plausible: where noise may take a place that is hardly told
 _APART = 3.0  # px of the coarse picture between two candidates
 _FIRST, _THEN = (24.0, 24.0, 8.0, 8.0), (8.0, 8.0, 3.0, 3.0, 3.0)  # px to both sides in which steps are sought
 _FEWER, _BEST = 4, 4  # the model's points are first so many times fewer; places that are looked at with all
 _SIGNIFICANT = 6.0  # of the noise of a slope across an edge
-_EXPLAINED = 1.5  # px from its place at which a step explains a point of the model
-_LEAST = 0.3  # share of the model that the right place explains at least
+_SYMMETRIES = (2, 3, 4, 5, 6)  # parts of a turn that may leave a part as it looks
+_ALONG, _BESIDE, _SMALLEST = 0.95, 8.0, 1.5  # cosine of edges side by side; px along them; the least window, px
+_EXPLAINED = 0.75  # px from its place at which a step explains a point of the model
+_LEAST = 0.5  # share of the model that the right place explains at least
 _SAME = 0.75  # of the best place's share of the model that is explained: what explains as much is another answer
 _SPREAD = 0.5  # px: of a step's place
 
@@ -130,12 +133,14 @@ def candidates(image: np.ndarray, picture: Picture) -> tuple[Place, ...]:
     """
     slopes = _Slopes.of(image, picture)
     near = [_refined(slopes, picture, start, _FIRST, model.thinned(_FEWER)) for start, model in _starts(image, picture)]
-    fine = [
-        _refined(slopes, picture, each.placement, _THEN, outline(placed(picture, each.placement)))
-        for each in _different(picture, near)[:_BEST]
-    ]
-    good = [each for each in fine if each.explained >= _LEAST and _is_plausible(picture, each.placement)]
-    return tuple(_different(picture, good))
+
+    def finer(starts: Iterable[np.ndarray]) -> list[Place]:
+        each = (_refined(slopes, picture, start, _THEN, outline(placed(picture, start))) for start in starts)
+        return [one for one in each if one.explained >= _LEAST and _is_plausible(picture, one.placement)]
+
+    found = _different(picture, finer(each.placement for each in _different(picture, near)[:_BEST]))
+    alike = _turned_alike(picture, found[0].placement) if found else []
+    return tuple(_different(picture, [*found, *finer(alike)]))
 
 
 def _different(picture: Picture, found: list[Place]) -> list[Place]:
@@ -148,8 +153,21 @@ def _different(picture: Picture, found: list[Place]) -> list[Place]:
 
 
 def _is_plausible(picture: Picture, placement: np.ndarray) -> bool:
-    left = placement - np.array(picture.scene.placement.expected)
+    """Whether its shift, and its tilt and turn one after the other, are within what the scene says, and a little."""
+    expected, axis = np.array(picture.scene.placement.expected), _free_axis(picture)
+    left = placement - expected
+    if axis is not None:  # a rotation vector's components are no tilts where it is long
+        about = 2 * np.degrees(np.arctan(_half_tangent(turn(placement[3:]), axis)))
+        tilt = turn_vector(turn(placement[3:]) @ turn(about * axis).T)
+        left = np.concatenate([left[:3], tilt + about * axis - expected[3:]])
     return bool((np.abs(left) <= _BEYOND * limits(picture.scene.uncertainty) + 1e-9).all())
+
+
+def _half_tangent(rotation: np.ndarray, axis: np.ndarray) -> float:
+    """Of half the angle by which a rotation turns about an axis, before it tilts it (swing and twist)."""
+    odd = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    whole = 1 + float(np.trace(rotation))  # 4 cos^2 of half the whole angle
+    return float(axis @ odd) / max(whole, 1e-12)
 
 
 def rivals(found: tuple[Place, ...]) -> tuple[Place, ...]:
@@ -165,30 +183,52 @@ def _shifts(picture: Picture, placement: np.ndarray) -> float:
     return float(np.linalg.norm(moved, axis=-1).max())
 
 
+def _free_axis(picture: Picture) -> np.ndarray | None:
+    """The axis about which the part may lie anyhow, a unit vector; None where all turns are small."""
+    reach = limits(picture.scene.uncertainty)[3:]
+    return None if reach.max() <= MOST_TILT else np.eye(3)[reach.argmax()]
+
+
+def _turned_alike(picture: Picture, placement: np.ndarray) -> list[np.ndarray]:
+    """Places at which a part of rotational symmetry would look the same: about its middle, by parts of a turn."""
+    axis, here = _free_axis(picture), placed(picture, placement)
+    if axis is None:
+        return []
+    corners, pivot = here.scene.solid.vertices, np.array(here.scene.camera.look_at)
+    away = (corners.min(0) + corners.max(0)) / 2 - pivot
+    angles = sorted({360 * k / count for count in _SYMMETRIES for k in range(1, count)})
+    return [combined(placement, np.concatenate([away - turn(a * axis) @ away, a * axis])) for a in angles]
+
+
 def _starts(image: np.ndarray, picture: Picture) -> list[tuple[np.ndarray, Outline]]:
-    """Placements of shifts along the image and turns about the line of sight that lie best upon edges, and what is seen
-    there."""
+    """Placements of shifts along the image and turns, about the line of sight or the one axis about which the part may
+    lie anyhow, that lie best upon edges, and what is seen there."""
     shrink = max(1, min(image.shape) // _COARSE)
     near = _nearness(cv2.resize(image.astype(np.float32), None, fx=1 / shrink, fy=1 / shrink,
                                 interpolation=cv2.INTER_AREA))  # fmt: skip
     sensor, camera = np.array(list(picture.sensor)), picture.scene.camera
     axes, reach = camera_frame(camera, sensor), limits(picture.scene.uncertainty)
-    most_turn = float(np.abs(axes.forward) @ reach[3:])
+    free = _free_axis(picture)
+    axis = axes.forward if free is None else free
     across = [float(np.abs(axis) @ reach[:3]) for axis in (axes.right, axes.down)]
     scale = camera.focal_px / camera.distance / shrink
     most = np.ceil(np.array(across) * scale / _STEP).astype(int)
     rows, model, of = [], None, np.inf
-    for angle in _angles(most_turn):
-        turned = placed(picture, np.concatenate([np.zeros(3), angle * axes.forward]))
+    for angle in _angles(float(np.abs(axis) @ reach[3:])):
+        turned = placed(picture, np.concatenate([np.zeros(3), angle * axis]))
         if model is None or abs(angle - of) > _ALIKE:
             model, of = outline(turned), angle
         at, normal = model.seen(turned)
         score = _score(near, (at + 0.5) / shrink - 0.5, normal, most)
         for y, x in _peaks(score):
             along = _STEP / scale * ((x - most[0]) * axes.right + (y - most[1]) * axes.down)
-            rows.append((score[y, x], np.concatenate([along, angle * axes.forward]), model))
-    rows.sort(key=lambda row: -row[0])
-    return [(placement, model) for score, placement, model in rows[:_REFINED] if score > 0]
+            rows.append((score[y, x], np.concatenate([along, angle * axis]), model))
+    kept: list[tuple[np.ndarray, Outline]] = []
+    for _, placement, model in sorted(rows, key=lambda row: -row[0]):
+        apart = (_shifts(picture, difference(placement, other)) for other, _ in kept)
+        if len(kept) < (_REFINED if free is None else _ALL_ROUND) and all(each > _STEP * shrink for each in apart):
+            kept.append((placement, model))
+    return kept
 
 
 def _angles(most: float) -> np.ndarray:
@@ -258,13 +298,25 @@ class _Slopes:
         places = at[:, None] + away[:, None] * normal[:, None]
         rise = np.abs(normal[:, :1] * _bilinear(self.across, places) + normal[:, 1:] * _bilinear(self.down, places))
         rise = rise * (1 - 0.5 * (away / (reach + step)) ** 2)  # of steps alike the nearer one
-        best = rise.argmax(1)
+        best = np.where(np.abs(away) <= _own(at, normal)[:, None], rise, 0.0).argmax(1)
         rows, inner = np.arange(len(at)), np.clip(best, 1, len(away) - 2)
         before, here, after = (rise[rows, inner + k] for k in (-1, 0, 1))
         bend = before - 2 * here + after
         finer = np.where((bend < 0) & (best == inner), (before - after) / (2 * np.where(bend < 0, bend, -1.0)), 0.0)
-        good = (rise[rows, best] > _SIGNIFICANT * self.noise) & (best == inner)
+        good = (here > _SIGNIFICANT * self.noise) & (best == inner) & (here >= np.maximum(before, after))
         return away[best] + np.clip(finer, -0.5, 0.5) * step, good
+
+
+def _own(at: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """How far across an edge at places (n, 2) a step is still its own, px, (n,): halfway to the next edge beside it.
+
+    Else a faint edge of the model would be drawn upon a strong one that runs along it.
+    """
+    away = at[None] - at[:, None]
+    across = np.abs(np.einsum("ijk,ik->ij", away, normal))
+    along = np.abs(away[..., 0] * -normal[:, None, 1] + away[..., 1] * normal[:, None, 0])
+    beside = (np.abs(normal @ normal.T) > _ALONG) & (along <= _BESIDE) & (across > _BESIDE / 4)
+    return np.maximum(np.where(beside, across, np.inf).min(1, initial=np.inf) / 2, _SMALLEST)
 
 
 def _bilinear(image: np.ndarray, places: np.ndarray) -> np.ndarray:

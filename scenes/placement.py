@@ -22,6 +22,8 @@ COMPONENTS = (
     *(f"part_tilt_deg.{axis}" for axis in "xyz"),
 )
 """What a placement is made of: a shift [length] and a rotation vector about ``camera.look_at`` [degrees]."""
+MOST_TILT = 15.0
+"""Degrees that the part's place may be off to either side about all axes but one, where it is found in a picture."""
 
 
 class Placement(Model):
@@ -119,6 +121,10 @@ def _check_datums(scene: Scene) -> None:
         raise ValueError("placement.datums must be at least one edge or circle, got none")
     if placement.datum_sd is None:
         raise ValueError("placement.datum_sd must be given with datums, got nothing")
+    if np.sort(limits(scene.uncertainty)[3:])[1] > MOST_TILT:
+        raise ValueError(
+            f"uncertainty.part_tilt_deg must be limited to {MOST_TILT:g} degrees about two axes for datums, got more"
+        )
     edges, rims = [edge.name for edge in solid.sharp], [each.name for each in solid.rims]
     for name in placement.datums:
         if name not in edges and name not in rims:
