@@ -14,7 +14,8 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from imaging.placed import combined, difference, placed
 from measure.quantities import find
-from planner.search.objective import minimised
+from planner.search.candidates import RayTraced
+from planner.search.objective import SearchProblem, minimised
 from scenes import InvalidInput, Picture
 from scenes.placement import prior
 from tests import placements as parts
@@ -215,6 +216,18 @@ def test_a_known_place_changes_nothing_and_an_uncertain_one_adds_what_the_budget
     of_place = [sum(u**2 for name, u in row.items() if name.startswith("part_")) for row in rows]
     np.testing.assert_allclose(errors[1].placed, of_place, rtol=1e-5)
     assert (minimised(errors[1], "object") > 100 * minimised(errors[0], "object")).all()
+
+
+def test_a_plan_minimises_what_the_place_leaves_open_too(block):
+    """A setting's number is the worst of noise, datums and place together, over the tolerance, also at a glance."""
+    scene = _with(block, placement={"datum_sd": 0.02}).scene
+    problem = SearchProblem.of(scene, "calibrated", "object")
+    sensor, light = np.array(parts.SENSOR), np.array(parts.LIGHT)
+    errors = variance_model("calibrated")(Pictures.of(Picture.of(scene, parts.SENSOR, parts.LIGHT)))
+    whole = (errors.variances_object + errors.placed) / 0.05**2
+    assert RayTraced.of(problem, sensor, light).value == pytest.approx(whole.max(), rel=1e-9)
+    assert problem.values(sensor[None], light[None])[0] == pytest.approx(whole.max(), rel=1e-3)
+    assert (errors.variances_object / 0.05**2).max() < 0.8 * whole.max()  # negative control: noise alone
 
 
 def test_the_budget_of_a_place_from_datums_has_them_in_place_of_the_fixture(block):
