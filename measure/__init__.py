@@ -26,6 +26,7 @@ from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.photograph import MeasuredShape, Shapes, photograph
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.photon_transfer import FramePair, PhotonTransfer, photon_transfer
+from measure.placement import Located, locate
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
 
@@ -44,6 +45,7 @@ __all__ = [
     "FramePair",
     "Images",
     "Intrinsics",
+    "Located",
     "MeasuredShape",
     "MeasuredValue",
     "Measurement",
@@ -70,6 +72,7 @@ __all__ = [
     "fit_ellipse",
     "fitted_field",
     "load_lens",
+    "locate",
     "measure",
     "measure_by",
     "measure_quadrilateral",

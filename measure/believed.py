@@ -1,6 +1,6 @@
 """Values of displaced lines and circles, evaluated with the nominal model (poses and camera as the scene says).
 
-Not linearised: displacements may be large.
+Not linearised: displacements may be large. Only the adjustment of a part's place from datums is linear in them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from imaging.features.kinds import on_plane
 from imaging.features.measurand import measurands
 from imaging.features.seen import unit_normals
 from imaging.geometry.lens import image_centre
+from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.pictures import Pictures
 from measure.features.layout import layout_of
 from measure.quantities import found_in_images, values
@@ -50,4 +51,8 @@ def believed(picture: Picture, errors: np.ndarray) -> np.ndarray:
     forms = dict(zip(known.seen.forms, errors[:, known.seen.of_forms].T, strict=True))
     seen = found_in_images(known, layout_of(picture), turned, points, circles, forms)
     none = np.zeros((len(errors), errors.shape[1], errors.shape[1]))
-    return values(seen, known.quantities, on_plane, none).value
+    found = values(seen, known.quantities, on_plane, none)
+    if known.placing is None:
+        return found.value
+    adjustment = variance_model(DEFAULT_MODEL)(Pictures.of(picture)).adjustment
+    return found.value - np.einsum("nmk,nk->nm", adjustment.pulls(found.gradient), adjustment.estimate(errors))

@@ -52,6 +52,9 @@ class Measurements(Shown):
         where none was made; infinite where more pixels are saturated, or fewer, than those of which it tells. Where
         one was, the variances of what was ``clutter`` or ``misfit`` are those propagated in the simulated picture, for
         the estimator's own are those of a lone edge.
+    u_placed : ndarray, shape (..., M)
+        Standard uncertainty (not variance) of the values by what is not known of the part's place and of the datums on
+        it (`scenes.Placement`), `units`; 0 where the place counts as known.
     forms : dict
         By name of each form (`scenes.measurands.form`) its points and their law in each image, in order
         (`measure.features.forms.FoundForm`); None where it is not found.
@@ -72,6 +75,7 @@ class Measurements(Shown):
     bias: np.ndarray
     u_bias: np.ndarray
     forms: dict[str, tuple[FoundForm | None, ...]] = field(default_factory=dict)
+    u_placed: np.ndarray = field(default_factory=lambda: np.zeros(()))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -84,8 +88,9 @@ class Measurements(Shown):
 
     @property
     def u(self) -> np.ndarray:
-        """Combined standard uncertainty, of noise and of the bias' correction, shape (..., M); NaN without one."""
-        return np.hypot(self.sigma, self.u_bias)
+        """Combined standard uncertainty, of noise, of the bias' correction and of the part's place, shape (..., M); NaN
+        without a correction."""
+        return np.sqrt(self.sigma**2 + self.u_bias**2 + self.u_placed**2)
 
     def as_rows(self) -> list[dict[str, Any]]:
         """One record an image and measurand: scene and poses, value, one sigma, u, status; None: there is none."""
@@ -249,6 +254,7 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         saturated=saturation.reshape(lead),
         bias=np.zeros((*lead, count)),
         u_bias=np.full((*lead, count), np.nan),
+        u_placed=np.sqrt(np.einsum("nmm->nm", found.placed)).reshape(*lead, count),
         forms={quantity.name: form.found for quantity, form in found.forms.items()},
     )
 

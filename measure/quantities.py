@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtrc
 
 from imaging.features.kinds import Evaluated, in_image, on_plane
 from imaging.features.measurand import Measurands, dense, measurands
-from imaging.features.seen import Seen
+from imaging.features.placing import Adjustment
+from imaging.features.seen import Seen, unit_normals
 from imaging.geometry.lens import image_centre
 from imaging.models.extremes import extremes_of, with_extremes
 from imaging.pictures import Pictures
@@ -19,6 +21,7 @@ from measure.features.found import MIN_SINE, Shape
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import Circles, find_circle
 from measure.features.shape import find_shape
+from measure.goodness import WORST
 from scenes import Corner, Picture, Quantity, status
 from scenes.measurands.between import Crossing
 
@@ -67,8 +70,56 @@ class MeasuredFeatures:
 
     @cached_property
     def plane(self) -> Values:
-        """On the planes of the features: the scene's unit, degrees."""
-        return values(self.seen, self.known.quantities, on_plane, self.errors)
+        """On the planes of the features: the scene's unit, degrees; the part's place adjusted where it is not known."""
+        found = values(self.seen, self.known.quantities, on_plane, self.errors)
+        if self.adjustment is None:
+            return found
+        moved = np.einsum("nmk,nk->nm", self.adjustment.pulls(found.gradient), self.placement)
+        gradient = self.adjustment.gradient(found.gradient)
+        return Values(found.value - moved, gradient, _spread(gradient, self.errors))
+
+    @cached_property
+    def adjustment(self) -> Adjustment | None:
+        """Of the part's place in each image; None where it is known."""
+        placing = self.known.placing
+        return None if placing is None else placing.adjusted(self.of_datums)
+
+    @cached_property
+    def of_datums(self) -> np.ndarray:
+        """Covariance (n, q, q) of lines and circles, infinite on the diagonal of those that are not measured."""
+        states = np.concatenate([self.shape.counted, *(c.state[:, None] for c in self.circles)], 1)
+        lost = np.zeros((len(self.status), self.seen.count), bool)
+        good, edges = np.isin(states.astype(str), status.MEASURED), len(self.names)
+        lost[:, : 2 * edges] = np.repeat(~good[:, :edges], 2, 1)
+        for c in range(len(self.circles)):
+            lost[:, self.seen.numbers(c)] = ~good[:, edges + c, None]
+        return np.where(lost[:, :, None] & np.eye(self.seen.count, dtype=bool), np.inf, self.errors)
+
+    @cached_property
+    def placement(self) -> np.ndarray:
+        """The most likely place of the part beside the expected one, (n, k), in units of what is known before."""
+        return self.adjustment.estimate(self.offsets)
+
+    @cached_property
+    def placed(self) -> np.ndarray:
+        """Covariance (n, M, M) of the values on the plane by what is not known of the part's place; 0 where it is."""
+        count = len(self.known.quantities)
+        if self.adjustment is None:
+            return np.zeros((len(self.status), count, count))
+        return self.adjustment.placed(values(self.seen, self.known.quantities, on_plane, self.errors).gradient)
+
+    @cached_property
+    def offsets(self) -> np.ndarray:
+        """How far off the expected ones lines and circles are found, (n, q), numbered as in `Seen`; 0 of forms."""
+        expected, found = self.known.seen, np.zeros((len(self.status), self.seen.count))
+        normal, edges = unit_normals(self.seen.along), 2 * len(self.names)
+        along = np.einsum("nei,ei->ne", normal, expected.normals)
+        off = np.einsum("nei,nei->ne", normal, self.seen.start - expected.start)
+        sine = np.einsum("ei,nei->ne", expected.normals[:, ::-1] * [-1, 1], normal)
+        found[:, 0:edges:2], found[:, 1:edges:2] = off / along, np.arctan2(sine, along)
+        for c, circle in enumerate(self.circles):
+            found[:, expected.numbers(c)] = circle.errors
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -114,16 +165,29 @@ def find(
     }
     sizes = {quantity: form.size for quantity, form in forms.items()}
     seen = found_in_images(known, layout, shape.normals, shape.points, tuple(c.errors for c in circles), sizes)
-    errors = _errors(shape, circles, forms, known.seen)
-    return MeasuredFeatures(
+    found = MeasuredFeatures(
         known=known,
         shape=shape,
         circles=circles,
         forms=forms,
         seen=seen,
-        errors=errors,
+        errors=_errors(shape, circles, forms, known.seen),
         status=_states(known, shape, circles, forms),
     )
+    return found if found.adjustment is None else replace(found, status=_placed_states(found))
+
+
+def _placed_states(found: MeasuredFeatures) -> np.ndarray:
+    """The statuses (n, M), with what the adjustment of the part's place says of its datums."""
+    placing, quantities = found.known.placing, found.known.quantities
+    at_known = values(found.seen, quantities, on_plane, found.errors).gradient
+    squares, freedom = placing.squares(found.of_datums, found.offsets)
+    fits = chdtrc(np.maximum(freedom, 1), squares) >= WORST  # less than expected is a datum_sd on the safe side
+    variances = np.einsum("nmm->nm", found.plane.covariance)
+    untold = found.adjustment.matters(at_known, variances, quantities) if placing.features else ~fits[:, None]
+    said = np.where(untold, status.UNPLACED, np.where(fits[:, None], status.OK, status.MISFIT))
+    pairs = zip(found.status.ravel(), np.broadcast_to(said, found.status.shape).ravel(), strict=True)
+    return np.array([status.worst(*pair) for pair in pairs]).reshape(found.status.shape)
 
 
 def found_in_images(

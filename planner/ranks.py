@@ -12,10 +12,11 @@ from scenes import Corner, status
 from scenes.measurands.between import Crossing
 from scenes.status import WORST_FIRST
 
-_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _CLUTTER, _OK = map(
+_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _UNPLACED, _CLUTTER, _OK = map(
     WORST_FIRST.index,
-    (status.NOT_VISIBLE, status.SHORT, status.LOW_CONTRAST, status.ILL_CONDITIONED, status.CLUTTER, status.OK),
-)
+    (status.NOT_VISIBLE, status.SHORT, status.LOW_CONTRAST, status.ILL_CONDITIONED, status.UNPLACED, status.CLUTTER,
+     status.OK),
+)  # fmt: skip
 MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
 
@@ -50,7 +51,7 @@ def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
         for left, crowded in zip(evaluated.left, evaluated.crowded, strict=True)
     ]
     rims += [np.array(_OK)] * (len(known.circles) - len(rims))
-    lead = evaluated.variances.shape[:-1]
+    lead, unplaced = evaluated.variances.shape[:-1], _are_unplaced(evaluated)
     single = np.stack([np.broadcast_to(each, lead) for each in (*np.moveaxis(edges, -1, 0), *rims)], -1)
     ranks = []
     for m, (quantity, needs) in enumerate(zip(known.quantities, known.depends(), strict=True)):
@@ -60,8 +61,17 @@ def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
             flat = flat | (sine(evaluated, corner) < MIN_SINE)
         lost = ~np.isfinite(evaluated.variances[..., m])
         told = np.where(flat, np.minimum(rank, _ILL_CONDITIONED), np.where(lost, _NOT_VISIBLE, rank))
+        told = np.where(unplaced[..., m], np.minimum(told, _UNPLACED), told)
         ranks.append(np.where(rank <= _LOW_CONTRAST, rank, told))
     return np.stack(ranks, -1)
+
+
+def _are_unplaced(evaluated: Errors) -> np.ndarray:
+    """Of which quantities what the datums do not tell of the part's place matters, bool (..., M)."""
+    adjustment, known = evaluated.adjustment, evaluated.measurands
+    if adjustment is None or not known.datums:
+        return np.zeros(evaluated.variances.shape, bool)
+    return adjustment.matters(known.gradient_object, evaluated.variances_object, known.quantities)
 
 
 def sine(evaluated: Errors, corner: Corner | Crossing) -> np.ndarray:

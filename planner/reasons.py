@@ -11,7 +11,7 @@ from imaging.models.errors import Errors
 from planner.ranks import MIN_SINE, edge_ranks, least_contrast, sine
 from scenes import Corner
 from scenes.measurands.between import Crossing
-from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, NOT_VISIBLE, OK, SHORT, WORST_FIRST
+from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, NOT_VISIBLE, OK, SHORT, UNPLACED, WORST_FIRST, allowed
 
 
 def reason(evaluated: Errors, clutter: np.ndarray, bias_image: float, m: int, status: str) -> str:
@@ -30,6 +30,8 @@ def reason(evaluated: Errors, clutter: np.ndarray, bias_image: float, m: int, st
     if status == OK:
         return ""
     known = evaluated.measurands
+    if status == UNPLACED:
+        return _unplaced(evaluated, m)
     if status == ILL_CONDITIONED:
         return _flattest(evaluated, known.quantities[m].crossings)
     names, ranks = known.view.names, edge_ranks(evaluated, clutter)
@@ -95,6 +97,18 @@ def _faint(evaluated: Errors, edges: list[int]) -> str:
     return (
         f"the contrast at edge {evaluated.measurands.view.names[worst]} is {evaluated.contrast[worst]:.2g} grey levels;"
         f" at least {least[worst]:.2g} are needed, {MIN_CONTRAST:g} times the noise"
+    )
+
+
+def _unplaced(evaluated: Errors, m: int) -> str:
+    known, adjustment = evaluated.measurands, evaluated.adjustment
+    if adjustment is None:
+        return ""
+    gradient, zone = known.gradient_object[m], known.quantities[m].tolerance
+    most = allowed(float(np.sqrt(evaluated.variances_object[m])), 0.0 if zone is None else zone.half)
+    return (
+        f"{_joined(known.datums)} tell less of {adjustment.guilty(gradient)} than was known before, which leaves "
+        f"{float(adjustment.untold(gradient[None])[0]):.2g} (1 sigma); at most {most:.2g} may be left"
     )
 
 

@@ -155,8 +155,9 @@ def _meaning(text: str) -> tuple[str, str]:
     >>> _meaning("Width of the image [px].")
     ('Width of the image.', 'px')
     """
-    found = re.fullmatch(r"(.*?) ?\[([^\]]+)\]\.?", " ".join(text.split()))
-    return (f"{found[1]}.".replace("``", "`"), found[2]) if found else (text.replace("``", "`"), "")
+    line = " ".join(text.split()).replace("``", "`")
+    found = re.fullmatch(r"(.*?) ?\[([^\]]+)\]\.?", line)
+    return (f"{found[1]}.", found[2]) if found else (line, "")
 
 
 def _shown(default: Any) -> str:

@@ -39,6 +39,7 @@ from scenes.parts.part_file import PartFile, with_walls
 from scenes.parts.solid import Solid, assembled
 from scenes.parts.step_file import Step
 from scenes.parts.turned import Turned
+from scenes.placement import Placement, check_placement, datums_of
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
 from scenes.results import html_of
@@ -160,6 +161,8 @@ class Scene(Model):
     """Numbers with an uncertainty; also written in their places, as `{ value = 25, sd = 0.05 }`."""
     uncertainty: Uncertainty = Uncertainty()
     """The same of what is no number of a scene."""
+    placement: Placement = Placement()
+    """How it is known where the part lies."""
 
     def _repr_html_(self) -> str:
         rows = [
@@ -179,8 +182,10 @@ class Scene(Model):
 
     @property
     def features(self) -> tuple[Basic, ...]:
-        """Those that are found for all quantities, in their order; none of a scene that asks for nothing."""
-        return sum((quantity.basic for quantity in quantities_of(self.task, self.measurands)), ())
+        """Those that are found for all quantities, in their order, then the placement's datums; none of a scene that
+        asks for nothing."""
+        asked = sum((quantity.basic for quantity in quantities_of(self.task, self.measurands)), ())
+        return asked + datums_of(self) if asked else ()
 
     @property
     def required(self) -> tuple[str, ...]:
@@ -379,6 +384,7 @@ class Scene(Model):
         self._check_curved()
         self._check_colour()
         self._check_forms()
+        check_placement(self)
         check_textures(self.textures, self.solid)
         check_uncertain(self, self.uncertain)
         self.uncertainty.check_once(self.uncertain)

@@ -16,6 +16,7 @@ TONE_UNKNOWN = "tone_unknown"
 GLANCED = "glanced"
 CLUTTER = "clutter"
 MISFIT = "misfit"
+UNPLACED = "unplaced"
 CORRELATED = "correlated"
 COMPRESSED = "compressed"
 AMBIGUOUS = "ambiguous"
@@ -36,6 +37,7 @@ MEANINGS = {
     AMBIGUOUS: "another solution explains the image as well",
     COMPRESSED: "compression (JPEG) has lost what is no noise: the variance is too small",
     CORRELATED: "the noise of neighbouring pixels is not independent: the variance is not exact",
+    UNPLACED: "the datums tell less of the part's place than was known before, and it matters",
     MISFIT: "the image is not what the model says within its noise: neither value nor variance can be relied on",
     CLUTTER: "what lies around an edge (another edge, shading, the end of the scale) biases the value",
     TONE_UNKNOWN: "neither file nor picture says whether levels are linear in the light, and it matters",
@@ -52,6 +54,8 @@ REMEDIES = {
     AMBIGUOUS: "give a start nearer to the true pose, or show one more feature",
     COMPRESSED: "save pictures without compression (PNG, TIFF)",
     CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
+    UNPLACED: "name datums that lie farther apart or at other heights, turn the camera, or say the part's place more "
+    "exactly (`uncertainty.part_shift`, `part_tilt_deg`)",
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
     CLUTTER: "move lamp or camera (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
@@ -60,7 +64,7 @@ REMEDIES = {
 }
 WORST_FIRST = tuple(MEANINGS)
 ALL = frozenset(MEANINGS)
-MEASURED = (OK, GLANCED, TONE_UNKNOWN, CLUTTER, MISFIT, CORRELATED, COMPRESSED)
+MEASURED = (OK, GLANCED, TONE_UNKNOWN, CLUTTER, MISFIT, UNPLACED, CORRELATED, COMPRESSED)
 OF_SIGMA, OF_TOLERANCE = 1.0, 0.2  # what u(bias) may be of noise, and of half the tolerance zone
 
 
@@ -157,6 +161,8 @@ def doubt(status: str, bias: str = "") -> str:
         return ""
     if status in (CORRELATED, COMPRESSED):
         return f"{status}, uncertainty unknown"
+    if status == UNPLACED:
+        return f"{status}, place of the part not told"
     if status not in MEASURED:
         return f"{status}, no value"
     return f"{status}, bias up to {bias}" if bias and status == CLUTTER else f"{status}, bias unknown"

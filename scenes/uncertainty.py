@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
 
 from scenes.cameras.covariance import ORDER, Covariance, of_document
+from scenes.errors import KIND
 from scenes.influences import AnyInfluence
 from scenes.model import Model
 from scenes.ranges import Rounding, Spread
@@ -27,7 +28,12 @@ def _read(value: Any, info: ValidationInfo) -> Any:
 Deviation = Annotated[
     Uncertain | None, BeforeValidator(_or_sd, json_schema_input_type=float | Uncertain | None)
 ]  # 0 is expected, or what its value says
-
+_Each = Annotated[Uncertain, BeforeValidator(_or_sd, json_schema_input_type=float | Uncertain)]
+Deviations = Annotated[
+    Annotated[Deviation, Tag(KIND + "one")] | Annotated[tuple[_Each, _Each, _Each], Tag(KIND + "each")],
+    Discriminator(lambda value: KIND + ("each" if isinstance(value, list | tuple) else "one")),
+]
+"""Of x, y and z alike, or of each its own."""
 
 _SAME = {
     "camera.focal_px": ("fx", "fy"), "camera.focal_length_mm": ("fx", "fy"), "camera.pixel_pitch_um": ("fx", "fy"),
@@ -52,10 +58,10 @@ class Uncertainty(Model):
     """Of the sensor's distance from ``look_at`` [length]."""
     light_deg: Deviation = None
     """Of every free light's place, in both directions as the sensor's; that of ``jitter`` where not given [degrees]."""
-    part_shift: Deviation = None
-    """Of the part's place, along x, y and z independently [length]."""
-    part_tilt_deg: Deviation = None
-    """Of its turns about axes through ``look_at`` along x, y and z, independently [degrees]."""
+    part_shift: Deviations = None
+    """Of the part's place, along x, y and z independently; of each its own in a list of three [length]."""
+    part_tilt_deg: Deviations = None
+    """Of its turns about axes through ``look_at`` along x, y and z, independently; of each in a list [degrees]."""
     principal_point_px: Deviation = None
     """Of the place at which the optical axis meets the sensor, along x and y independently [px]."""
     temperature_K: Deviation = None  # noqa: N815 - the unit
@@ -82,6 +88,12 @@ class Uncertainty(Model):
     is not sure of; known to within 1 % where not given [ratio]."""
     influences: tuple[AnyInfluence, ...] = ()
     """Influence quantities of kinds that a module of your own adds (`ice --plugin MODULE`)."""
+
+    @property
+    def of_part(self) -> tuple[Uncertain | None, ...]:
+        """How well the part's place is known: shifts along x, y and z, and turns about them; None: it is exact."""
+        pairs = (self.part_shift, self.part_tilt_deg)
+        return tuple(each for told in pairs for each in (told if isinstance(told, tuple) else (told,) * 3))
 
     @model_validator(mode="after")
     def _deviations(self) -> Uncertainty:

@@ -9,19 +9,26 @@ at some draws and told. Pictures have everything in themselves: noise, pattern a
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from measure import best_estimator
+from measure import best_estimator, locate, measure
 from measure.believed import believed
 from planner.budgeting.budgets import SceneBudget
 from planner.budgeting.station import Station
 from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE, TOGETHER
 from planner.uncertainty.groups import draw
+from scenes import Picture
+from scenes.placement import COMPONENTS
+from scenes.status import is_trusted
 from validation.stations import exposed
+
+if TYPE_CHECKING:
+    from validation.remeasured import MeasuredValues
 
 _AT_ONCE = 64  # pictures in memory
 _IN_A_PICTURE = (NOISE, PATTERN, MODEL, ROUNDING)
@@ -69,12 +76,18 @@ class Chain:
         return station
 
     def exact(self, errors: np.ndarray) -> np.ndarray:
-        """Values (count, M) of draws (count, n) without what is added; bias by levels to first order."""
+        """Values (count, M) of draws (count, n) without what is added; bias by levels, and what datums leave of the
+        part's place, to first order."""
         budget = self.budget
-        lit = np.array([source.kind == "brightness" for source in budget.sources], bool)
-        placed = np.where(lit, 0.0, errors)
+        first = np.array([source.kind == "brightness" or source.name in self._told for source in budget.sources], bool)
+        placed = np.where(first, 0.0, errors)
         found = [budget.features.errors(self.station(row)) for row in placed]
-        return believed(budget.picture, np.array(found)) + errors[:, lit] @ budget.sensitivities[:, lit].T
+        return believed(budget.picture, np.array(found)) + errors[:, first] @ budget.sensitivities[:, first].T
+
+    @property
+    def _told(self) -> tuple[str, ...]:
+        """Inputs that a picture tells itself, wherever the part lies: a measurement begins anew from there."""
+        return COMPONENTS if self.budget.picture.scene.placement.is_estimated else ()
 
     @cached_property
     def expansion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -145,7 +158,10 @@ class Chain:
                 done += size
                 report(done)
 
-        (found,) = remeasured(picture, exposures(), (Method(estimator or best_estimator(picture.scene)),))
+        if picture.scene.placement.is_estimated:
+            found = _located(picture, exposures(), estimator)
+        else:
+            (found,) = remeasured(picture, exposures(), (Method(estimator or best_estimator(picture.scene)),))
         for m, rows in enumerate(self.budget.terms):
             drawn = draw([row.as_input for row in rows], rng, count)
             found.object[:, m] += self.added(m, drawn, pictured=True)
@@ -158,3 +174,21 @@ class Chain:
             if step > 0:
                 values[:, m] = np.round(values[:, m] / step) * step
         return values
+
+
+def _located(picture: Picture, exposures: Iterable[np.ndarray], estimator: str | None) -> MeasuredValues:
+    """What is measured where each image shows the part; no value where it is not found."""
+    from validation.remeasured import MeasuredValues
+
+    values, states = [], []
+    for image in itertools.chain.from_iterable(exposures):
+        where = locate(image, picture, estimator=estimator)
+        if not is_trusted(where.status):
+            values.append(np.full((2, len(picture.scene.quantities)), np.nan))
+            states.append(np.full(len(picture.scene.quantities), where.status))
+            continue
+        told = measure(image, where.picture, estimator=estimator)
+        values.append(np.stack([told.value_image, told.value]))
+        states.append(told.status)
+    in_image, in_object = np.swapaxes(values, 0, 1)
+    return MeasuredValues(in_image, in_object, np.array(states))

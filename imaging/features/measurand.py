@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from imaging.features.kinds import Evaluated, in_image, on_plane
+from imaging.features.placing import Placing
 from imaging.features.projected_edges import ProjectedEdges, circles, corner_features, projected_edges
 from imaging.features.seen import Seen, corner_response, half_angle_of, unit_normals
 from imaging.geometry.lens import image_centre
@@ -39,16 +40,24 @@ class Measurands:
         The E different straight edges that they depend on.
     seen : Seen
         What they are found from.
+    placing : Placing, optional
+        How they tell where the part lies, where that is not known.
     """
 
     quantities: tuple[Quantity, ...]
     view: ProjectedEdges
     seen: Seen
+    placing: Placing | None = None
 
     @property
     def circles(self) -> tuple[str, ...]:
         """The C circles that they depend on."""
         return self.seen.circles
+
+    @property
+    def datums(self) -> tuple[str, ...]:
+        """Names of the features that tell where the part lies."""
+        return () if self.placing is None else self.placing.features
 
     @property
     def value(self) -> np.ndarray:
@@ -68,7 +77,7 @@ class Measurands:
 
     @property
     def gradient_object(self) -> np.ndarray:
-        """The same of the values on the planes of the features, shape (..., M, q)."""
+        """The same of the values on the planes of the features, shape (..., M, q), the part's place known."""
         return self._plane[1]
 
     @cached_property
@@ -141,7 +150,8 @@ def measurand(pictures: Pictures, number: int = 0) -> Measurand:
 
 def _measurands(pictures: Pictures) -> Measurands:
     view = projected_edges(pictures)
-    return Measurands(pictures.scene.quantities, view, expected(pictures, view))
+    seen = expected(pictures, view)
+    return Measurands(pictures.scene.quantities, view, seen, Placing.of(pictures.scene, seen))
 
 
 def dense(found: list[Evaluated], lead: tuple[int, ...], count: int) -> np.ndarray:

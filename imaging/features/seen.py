@@ -176,8 +176,12 @@ class Seen:
     def per_unit(self, side: Side, places: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """The same at places (..., n, 3) of an edge whose image has a unit normal (..., 2), shape (..., n)."""
         step = np.cross(face_beside(self.solid, side), along_of(self.solid, side))
-        slope = self._slopes(places - self.eye[..., None, :]) @ step
+        slope = self.slopes(places) @ step
         return np.abs(np.einsum("...ni,...i->...n", slope, normal))
+
+    def slopes(self, places: np.ndarray) -> np.ndarray:
+        """Derivative of the images of places (n, 3) by the places, px for the scene's unit, (..., n, 2, 3)."""
+        return self._slopes(places - self.eye[..., None, :])
 
     def _slopes(self, away: np.ndarray) -> np.ndarray:
         """Derivative of the image by places that are so far from the sensor (..., n, 3), px, (..., n, 2, 3)."""

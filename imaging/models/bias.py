@@ -142,10 +142,10 @@ def _bias(pictures: Pictures) -> Bias:
     start, turn = start + by_prints[0], turn + by_prints[1]
     shares, shares_object = (
         offset * start[..., None, :] + tilt * turn[..., None, :]
-        for offset, tilt in (known.of_lines(known.gradient), known.of_lines(known.gradient_object))
+        for offset, tilt in (known.of_lines(known.gradient), known.of_lines(_in_object(pictures, known)))
     )
     lines = np.stack([start, start + turn * known.view.lengths], -1)
-    needed = known.depends()[:, : len(known.view.names)]
+    needed = known.depends()[:, : len(known.view.names)] | [name in known.datums for name in known.view.names]
     values, values_object = (np.where(needed, each, 0.0).sum(-1) for each in (shares, shares_object))
     disturbed = ~((np.abs(steepness - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)).all(-1)
     disturbed |= by_prints[2]
@@ -153,6 +153,12 @@ def _bias(pictures: Pictures) -> Bias:
         disturbed |= _by_other_faces(pictures, known.view.names)
     corners = _corners(pictures.scene, known.view, lines)
     return Bias(values, values_object, lines, corners, shares, disturbed)
+
+
+def _in_object(pictures: Pictures, known: Measurands) -> np.ndarray:
+    """Derivatives (N, M, q) of the values in the object by the lines, the part's place adjusted where it is not known:
+    a bias of the datums moves them too."""
+    return known.gradient_object if known.placing is None else calibrated(pictures.glanced).gradient_object
 
 
 def _by_prints(pictures: Pictures) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -230,7 +230,11 @@ def _one(
     lines = np.einsum("eki,ij,elj->ekl", rows, covariance, rows)
     joint = rows.reshape(2 * edges, -1) @ covariance @ rows.reshape(2 * edges, -1).T
     hidden = np.logical_or(*(part[:, ~seen].any(-1) for part in known.of_lines(known.gradient)))
-    variances = (np.einsum("mi,ij,mj->m", each, joint, each) for each in (known.gradient, known.gradient_object))
+    plane = known.gradient_object
+    if known.placing is not None:
+        found = np.where(np.repeat(seen, 2), 0.0, np.inf)
+        plane = known.placing.adjusted(joint + np.diag(found)).gradient(plane)
+    variances = (np.einsum("mi,ij,mj->m", each, joint, each) for each in (known.gradient, plane))
     image, plane = (np.where(hidden, np.inf, each) for each in variances)
     return np.where(seen[:, None, None], lines, np.inf), image, plane
 

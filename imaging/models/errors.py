@@ -16,6 +16,7 @@ import numpy as np
 from imaging.features.circles import RimImage, rim
 from imaging.features.limbs import limb_rim
 from imaging.features.measurand import Measurands, measurands
+from imaging.features.placing import Adjustment
 from imaging.models.extremes import extremes_of, largest_moments, of_largest, with_extremes
 from imaging.models.form_law import form_variances
 from imaging.pictures import Pictures
@@ -72,8 +73,45 @@ class Errors:
     @cached_property
     def variances_object(self) -> np.ndarray:
         """The same in the object, the scene's unit squared (degrees^2)."""
+        return self.joint[1] if self.joint else _variances(self, self.gradient_object, self.measurands.value_object)
+
+    @cached_property
+    def gradient_object(self) -> np.ndarray:
+        """Derivatives of the values in the object by the features' errors (..., M, q), the part's place adjusted."""
+        known = self.measurands.gradient_object
+        return known if self.adjustment is None else self.adjustment.gradient(known)
+
+    @cached_property
+    def adjustment(self) -> Adjustment | None:
+        """Of the part's place, as this model knows the features; None where it is known."""
+        placing = self.measurands.placing
+        return None if placing is None else placing.adjusted(self._of_features())
+
+    @cached_property
+    def placed(self) -> np.ndarray:
+        """Variances of all quantities in the object by what is not known of the part's place, (..., M); 0 where it is
+        known."""
+        if self.adjustment is None:
+            return np.zeros(self.variances.shape)
+        return np.einsum("...mm->...m", self.adjustment.placed(self.measurands.gradient_object))
+
+    def _of_features(self) -> np.ndarray:
+        """Joint covariance (..., q, q) of lines and circles, which are independent."""
         known = self.measurands
-        return self.joint[1] if self.joint else _variances(self, known.gradient_object, known.value_object)
+        count = len(known.view.names)
+        one, none = np.ones(count), np.zeros(count)
+        first, second, both = (self.line_variance(*each) for each in ((one, none), (none, one), (one, one)))
+        whole = np.zeros((*np.shape(self.variances)[:-1], known.seen.count, known.seen.count))
+        lost = ~known.view.visible | ~np.isfinite(both)
+        for e in range(count):
+            whole[..., 2 * e, 2 * e] = np.where(lost[..., e], np.inf, first[..., e])
+            whole[..., 2 * e + 1, 2 * e + 1] = np.where(lost[..., e], np.inf, second[..., e])
+            with np.errstate(invalid="ignore"):
+                mixed = np.where(lost[..., e], 0.0, (both - first - second)[..., e] / 2)
+            whole[..., 2 * e, 2 * e + 1] = whole[..., 2 * e + 1, 2 * e] = mixed
+        for c, covariance in enumerate(self.circles):
+            whole[..., known.seen.numbers(c), known.seen.numbers(c)] = covariance
+        return whole
 
     @property
     def variance(self) -> np.ndarray:
@@ -92,16 +130,17 @@ class Errors:
         found. Not of a model that finds all jointly.
         """
         needs = self.measurands.depends()[number]
-        edges, circles = _parts(self, self.measurands.gradient_object[..., number, :], needs)
+        edges, circles = _parts(self, self.gradient_object[..., number, :], needs)
         names = [*self.measurands.view.names, *self.measurands.circles]
         each = [*np.moveaxis(edges, -1, 0), *circles]
-        return {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed}
+        datums = self.measurands.datums
+        return {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed or name in datums}
 
     def jointly(self, *, in_object: bool) -> np.ndarray:
         """Joint covariance (M, M) of all quantities of one picture in the object or in the image, extremes by their
         laws; infinite where not measurable."""
         known = self.measurands
-        gradient, values = (known.gradient_object, known.value_object) if in_object else (known.gradient, known.value)
+        gradient, values = (self.gradient_object, known.value_object) if in_object else (known.gradient, known.value)
         return with_extremes(known.quantities, values, gradient, self.covariance(gradient))[1]
 
     def covariance(self, gradient: np.ndarray) -> np.ndarray:
@@ -182,14 +221,16 @@ def _parts(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None) -> tu
     known = errors.measurands
     edges = len(known.view.names)
     offset, tilt = gradient[..., 0 : 2 * edges : 2], gradient[..., 1 : 2 * edges : 2]
-    needed = (offset != 0) | (tilt != 0) if needs is None else needs[:edges]
+    needed = (offset != 0) | (tilt != 0)
+    needed = needed if needs is None else needed | needs[:edges]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         parts = errors.line_variance(offset, tilt)
         variance = np.where(known.view.visible & np.isfinite(parts), parts, np.inf)
         lines, circles = np.where(needed, variance, 0.0), []
         for c, covariance in enumerate(errors.circles):
             pull = known.of_circle(gradient[..., None, :], c)[..., 0, :]
-            needed = (pull != 0).any(-1) if needs is None else needs[edges + c]
+            needed = (pull != 0).any(-1)
+            needed = needed if needs is None else needed | needs[edges + c]
             if not needed.any():
                 circles.append(np.zeros(np.broadcast_shapes(pull.shape[:-1], covariance.shape[:-2])))
                 continue

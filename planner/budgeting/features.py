@@ -20,6 +20,7 @@ from imaging.features.measurand import Measurands, measurands, normals
 from imaging.features.rim_sides import outward_normals
 from imaging.geometry.lens import undistorted
 from imaging.geometry.projection import edge_points, project_ideal
+from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
 from imaging.models.form_law import needed, residues
 from imaging.pictures import Pictures
@@ -45,6 +46,11 @@ class Features:
     def known(self) -> Measurands:
         """Values and derivatives by the features' errors."""
         return measurands(self.pictures)
+
+    @cached_property
+    def gradient_object(self) -> np.ndarray:
+        """Derivatives (M, q) of the values in the object by those errors, the part's place adjusted."""
+        return variance_model(DEFAULT_MODEL)(self.pictures).gradient_object
 
     def errors(self, station: Station) -> np.ndarray:
         """Errors of lines and circles, as numbered in `imaging.features.seen`, shape (q,).

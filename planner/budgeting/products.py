@@ -41,4 +41,4 @@ def _mixed(features: Features, here: Station, angle: Source, other: Source) -> n
         turned = angle.moved(here, sign * angle.told.u)
         ahead, behind = (features.errors(other.moved(turned, way * step)) for way in (1, -1))
         slopes.append((ahead - behind) / (2 * step))
-    return pulled(features.known.gradient_object, slopes[0] - slopes[1]) / 2
+    return pulled(features.gradient_object, slopes[0] - slopes[1]) / 2

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.bias import bias
 from planner.budgeting.features import Features
 from planner.budgeting.sources import Source
@@ -35,9 +36,11 @@ def sensitivities(features: Features, given: tuple[Source, ...], *, biased: bool
         The scene's unit, or degrees, for an input's unit; NaN where a quantity is not seen.
     """
     here = Station.nominal(features.pictures)
-    count = len(features.known.quantities)
+    count, left = len(features.known.quantities), _by_placement(features)
     columns = [
-        _by_geometry(features, here, each)
+        left[each.name]
+        if each.name in left
+        else _by_geometry(features, here, each)
         if each.kind == "geometry"
         else _by_brightness(here, each)
         if biased
@@ -47,10 +50,24 @@ def sensitivities(features: Features, given: tuple[Source, ...], *, biased: bool
     return np.stack(columns, -1) if columns else np.zeros((count, 0))
 
 
+def _by_placement(features: Features) -> dict[str, np.ndarray]:
+    """Derivatives (M,) by the components of the part's place that the datums tell: what the adjustment leaves of them.
+
+    A measurement takes the place as it is found for the believed one, and begins anew; so the adjustment's own
+    derivatives count, not those of a picture of a part far off.
+    """
+    errors = variance_model(DEFAULT_MODEL)(features.pictures)
+    adjustment, known = errors.adjustment, errors.measurands
+    if adjustment is None or not known.datums:
+        return {}
+    left = adjustment.left(known.gradient_object) / adjustment.placing.u
+    return dict(zip(adjustment.placing.names, left.T, strict=True))
+
+
 def _by_geometry(features: Features, here: Station, source: Source) -> np.ndarray:
     step = STEP * source.scale
     ahead, behind = (features.errors(source.moved(here, sign * step)) for sign in (1, -1))
-    return pulled(features.known.gradient_object, (ahead - behind) / (2 * step))
+    return pulled(features.gradient_object, (ahead - behind) / (2 * step))
 
 
 def pulled(gradient: np.ndarray, errors: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from planner.budgeting.station import Station
 from planner.uncertainty.inputs import Input
 from scenes import Scene, Uncertain
 from scenes.numbers import number_at, with_number
+from scenes.placement import COMPONENTS
 
 Kind = Literal["geometry", "brightness"]
 _GEOMETRY = (
@@ -126,12 +127,9 @@ def _poses(scene: Scene) -> Iterator[Source]:
                     lambda s, d: replace(s, roll_deg=s.roll_deg + d))  # fmt: skip
     yield from _one("sensor_distance", said.sensor_distance, scene.units, "geometry", near,
                     _number_moved("camera.distance"))  # fmt: skip
-    for i, axis in enumerate("xyz"):
-        yield from _one(f"part_shift.{axis}", said.part_shift, scene.units, "geometry", near, _tuple_moved("shift", i))
-    for i, axis in enumerate("xyz"):
-        yield from _one(
-            f"part_tilt_deg.{axis}", said.part_tilt_deg, "deg", "geometry", 1.0, _tuple_moved("tilt_deg", i)
-        )
+    for i, (name, told) in enumerate(zip(COMPONENTS, said.of_part, strict=True)):
+        unit, scale, attribute = (scene.units, near, "shift") if i < 3 else ("deg", 1.0, "tilt_deg")
+        yield from _one(name, told, unit, "geometry", scale, _tuple_moved(attribute, i % 3))
     for i, axis in enumerate("xy"):
         move = _tuple_moved("principal_px", i)
         yield from _one(f"principal_point_px.{axis}", said.principal_point_px, "px", "geometry", 100.0, move)

@@ -11,7 +11,7 @@ import numpy as np
 from imaging.features.measurand import Measurands, measurands
 from imaging.geometry.projection import edge_points
 from imaging.light.appearance import side_signals
-from imaging.models import variance_model
+from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.bias import MOST
 from imaging.pictures import Pictures
 from planner.budgeting.sources import Believed
@@ -22,6 +22,7 @@ from scenes import Centre, Noise, Scene, Uncertain
 NOISE, PATTERN, MODEL, ROUNDING = "pixel noise", "fixed pattern", "model error", "rounding"
 BIAS = "bias by "  # and what its correction is not sure of
 TOGETHER = "telecentricity x depth"
+DATUMS = "datums"  # where they lie on the part, beside where its model says
 TEMPERATURE, EXPANSION = "temperature_K", "expansion_per_K"
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length
 
@@ -76,17 +77,27 @@ def terms(
     """
     scene, known = pictures.scene, measurands(pictures)
     pattern = _pattern(pictures, known) if scene.uncertainty.fixed_pattern else np.zeros(len(variances))
-    found = []
+    found, datums = [], _by_datums(pictures)
     for m, each in enumerate(forecasts):
         noise = float(np.sqrt(variances[m]))
         rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), each.unit, 1.0, "noise")]
         rows += _of_bias(known, m, each, noise, biases, biased) if doubts is None else _of_doubts(doubts, m, each.unit)
         if together is not None and together[m] > 0:
             rows.append(Term(TOGETHER, 0.0, Uncertain(sd=float(together[m])), each.unit, 1.0))
+        if datums[m] > 0:
+            rows.append(Term(DATUMS, 0.0, Uncertain(sd=float(datums[m])), each.unit, 1.0))
         if pattern[m] > 0:
             rows.append(Term(PATTERN, 0.0, Uncertain(sd=float(pattern[m])), each.unit, 1.0))
         found.append(rows + _stated(scene, each))
     return found
+
+
+def _by_datums(pictures: Pictures) -> np.ndarray:
+    """Standard uncertainties (M,) by what the datums are off on the part; 0 where its place is known otherwise."""
+    errors = variance_model(DEFAULT_MODEL)(pictures)
+    if errors.adjustment is None:
+        return np.zeros(len(errors.measurands.quantities))
+    return np.sqrt(np.diag(errors.adjustment.by_datums(errors.measurands.gradient_object)))
 
 
 def _of_bias(

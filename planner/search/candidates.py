@@ -148,7 +148,7 @@ def _candidate(searched: Searched, sensor: np.ndarray, light: np.ndarray) -> Can
     sensor, light = (pose if kept else rounded(pose) for pose, kept in zip((sensor, light), held, strict=True))
     poses = Pose(*map(float, sensor)), as_poses(light)
     found = variance_model(problem.model)(Pictures.of(Picture.of(problem.scene, *poses)))
-    worst = int(np.argmax(found.variances_object * problem.objective.shares))
+    worst = int(np.argmax((found.variances_object + found.placed) * problem.objective.shares))
     return Candidate(
         *poses,
         problem.scene.required,
@@ -197,9 +197,11 @@ class RayTraced(NamedTuple):
     def of(cls, problem: SearchProblem, sensor: np.ndarray, light: np.ndarray) -> RayTraced:
         """Of a sensor (2,) and the free lights (2 F,), degrees."""
         told = predict(problem.scene, tuple(map(float, sensor)), as_poses(light), problem.model)
-        variances = [getattr(each, f"variance_{problem.objective.unit}") for each in told.measurands]
+        variances = np.array([getattr(each, f"variance_{problem.objective.unit}") for each in told.measurands])
+        if problem.scene.placement.source != "known" and problem.objective.unit == "object":
+            variances = variances + variance_model(problem.model)(Pictures.of(told.picture)).placed
         untrusted = sum(not is_trusted(each.status) for each in told.measurands)
-        return cls(sensor, light, told, float(problem.objective(np.array(variances))), untrusted)
+        return cls(sensor, light, told, float(problem.objective(variances)), untrusted)
 
 
 def trusted(

@@ -173,9 +173,12 @@ class SearchProblem:
 
 
 def minimised(errors: Errors, objective: str | Aim) -> np.ndarray:
-    """The variance that an objective is about (degrees^2 for an angle), or what an aim makes of several."""
+    """The variance that an objective is about (degrees^2 for an angle), or what an aim makes of several.
+
+    In the object what is not known of the part's place adds to the noise, unless it is known.
+    """
     aim = Aim.of(errors.measurands.quantities, objective)
-    return aim(errors.variances if aim.unit == "image" else errors.variances_object)
+    return aim(errors.variances if aim.unit == "image" else errors.variances_object + errors.placed)
 
 
 def cut_off(errors: Errors, scene: Scene) -> np.ndarray:

@@ -30,6 +30,7 @@ from tests.proofs.msa import msa
 from tests.proofs.pairs import pairs
 from tests.proofs.parts import parts
 from tests.proofs.photographs import photographs
+from tests.proofs.placements import placements
 from tests.proofs.processed import processed
 from tests.proofs.rate import rate
 from tests.proofs.real_noise import real_noise
@@ -67,6 +68,7 @@ app.command()(msa)
 app.command()(pairs)
 app.command()(parts)
 app.command()(photographs)
+app.command()(placements)
 app.command()(processed)
 app.command()(rate)
 app.command()(real_noise)

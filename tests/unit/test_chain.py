@@ -7,6 +7,7 @@ import pytest
 
 from planner.budgeting import plans
 from scenes import InvalidInput, Pose
+from scenes.placement import Placement
 from validation import chain
 
 U = np.array([0.3, 0.05, 2.0])
@@ -84,11 +85,14 @@ def test_a_station_is_moved_by_each_error():
     assert one.station(np.array([0.5, 0.0, -2.0])) == ("here", ("a", 0.5), ("c", -2.0))
 
 
+KNOWN = SimpleNamespace(scene=SimpleNamespace(placement=Placement()))
+
+
 def test_levels_count_to_first_order(monkeypatch):
     """Places by the station of the geometric errors, the bias by brightness linearly beside it."""
     asked = []
     monkeypatch.setattr(chain, "believed", lambda picture, errors: np.stack([errors, 10 * errors], -1))
-    budget = SimpleNamespace(sources=SOURCES, picture=None, sensitivities=LINEAR)
+    budget = SimpleNamespace(sources=SOURCES, picture=KNOWN, sensitivities=LINEAR)
     budget.features = SimpleNamespace(errors=lambda station: asked.append(station) or len(station) / 4)
     one = chain.Chain(budget)
     one.__dict__["here"] = ("here",)
@@ -206,3 +210,18 @@ def test_ratios_are_of_measurands_with_a_tolerance():
         measurands=(SimpleNamespace(U=3.0), SimpleNamespace(U=0.5)), prediction=SimpleNamespace(measurands=told)
     )
     assert plans.Placed(Pose(1, 2), Pose(3, 4), found).ratios == (2.0,)
+
+
+def test_places_that_datums_tell_count_to_first_order(monkeypatch):
+    """What the adjustment leaves of them, not the station that they make; all else as ever."""
+    asked = []
+    monkeypatch.setattr(chain, "believed", lambda picture, errors: np.stack([errors, errors], -1))
+    sources = (SimpleNamespace(name="part_shift.z", kind="geometry", value=0.0, moved=None), *SOURCES[:1])
+    placement = Placement(source="datums", datums=("e1",), datum_sd=0.0)
+    budget = SimpleNamespace(sources=sources, sensitivities=np.array([[3.0, 0.0], [0.5, 0.0]]))
+    budget.picture = SimpleNamespace(scene=SimpleNamespace(placement=placement))
+    budget.features = SimpleNamespace(errors=lambda station: asked.append(station) or 0.0)
+    one = chain.Chain(budget)
+    one.__dict__["here"] = ("here",)
+    assert one.exact(np.array([[2.0, 0.5]])) == pytest.approx(np.array([[6.0, 1.0]]))
+    assert asked == [("here", ("a", 0.5))]

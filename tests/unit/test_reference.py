@@ -43,7 +43,7 @@ def test_the_schema_knows_uncertain_numbers():
 def unknown(document, schema, whole, path=""):
     """Keys of a document that the schema does not know, and required ones that the document lacks."""
     if isinstance(document, dict) and "oneOf" in schema:
-        schema = next((part for part in schema["oneOf"] if is_meant(document, part, whole)), schema)
+        schema = next((part for part in schema["oneOf"] if "$ref" in part and is_meant(document, part, whole)), schema)
     if "$ref" in schema:
         schema = whole["$defs"][schema["$ref"].rsplit("/", 1)[-1]]
     if isinstance(document, dict) and "properties" in schema:

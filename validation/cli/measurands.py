@@ -16,7 +16,7 @@ from validation.strict_json import plain
 
 if TYPE_CHECKING:
     import measure
-    from validation.inspection import Inspection
+    from validation.inspection import Inspected, Inspection
 
 
 def facts(inspected: Inspection) -> list[dict[str, Any]]:
@@ -43,8 +43,16 @@ def facts(inspected: Inspection) -> list[dict[str, Any]]:
             "U": row.requirement.U,
             "decision": row.decision,
             "status": state,
-        } | ({"picture": row.picture} if len(inspected.taken) > 1 else {}))  # fmt: skip
+        } | _of_some(found, row, k, len(inspected.taken), good))  # fmt: skip
     return plain(rows)
+
+
+def _of_some(found: measure.Measurements, row: Inspected, k: int, pictures: int, good: bool) -> dict[str, Any]:
+    """What is told only of several pictures, and of a part whose place counts."""
+    several = {"picture": row.picture} if pictures > 1 else {}
+    if found.picture.scene.placement.source == "known":
+        return several
+    return several | {"u_placed": found.u_placed[k] if good else None}
 
 
 def zones(inspected: Inspection) -> list[dict[str, Any]]:

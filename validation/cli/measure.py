@@ -14,8 +14,8 @@ import scenes.photograph
 from scenes import InvalidInput
 from scenes.files.image import Size
 from scenes.photograph import Photograph
-from scenes.status import legend
-from validation.cli import measurands, photograph, recorded
+from scenes.status import is_trusted, legend
+from validation.cli import measurands, photograph, placement, recorded
 from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say, taking
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
@@ -151,6 +151,10 @@ def _measure_scene(given: Options) -> NoReturn:
     for each in shown:
         _check_inspection(given, each)
     images = [picture_file.read(file, Size.of_camera(known.camera)) for file, *_ in files]
+    places = [_located(image, each) for image, each in zip(images, shown, strict=True)]
+    if any(place is not None and not is_trusted(place.status) for place in places):
+        _say_lost(given, [place for place in places if place is not None])
+    shown = [each if place is None else place.picture for each, place in zip(shown, places, strict=True)]
     inspected = inspection.inspect(*(_measured(given, image, each) for image, each in zip(images, shown, strict=True)))
     if given.inspection is not None:
         from validation.report import inspection_files
@@ -158,7 +162,22 @@ def _measure_scene(given: Options) -> NoReturn:
         about = inspection_files.About(given.serial or "", tuple(file.name for file, *_ in files))
         inspection_files.write(inspected, images, about, given.inspection)
     first = inspected.taken[0].found.first if known.task is not None and len(files) == 1 else None
-    _say_measurands(given, inspected, first)
+    _say_measurands(given, inspected, first, [place for place in places if place is not None])
+
+
+def _located(image: np.ndarray, shown: scenes.Picture) -> measure.Located | None:
+    """Where the part lies in a picture; None where the scene says it."""
+    import measure
+
+    return measure.locate(image, shown) if shown.scene.placement.is_estimated else None
+
+
+def _say_lost(given: Options, places: list[measure.Located]) -> NoReturn:
+    """A part that is not found is not measured; exit status 1."""
+    told = {"file": str(given.file), "measurands": [], "covariance": [],
+            "placements": [placement.facts(each) for each in places]}  # fmt: skip
+    say(told, given.as_json, "\n".join(map(placement.text, places)))
+    raise typer.Exit(1)
 
 
 def _also(text: str) -> tuple[Path, Any, Any]:
@@ -224,7 +243,9 @@ def _shapes_wanted(given: Options) -> dict[str, Any]:
     return wanted
 
 
-def _say_measurands(given: Options, inspected: Inspection, distance: measure.Measurement | None) -> NoReturn:
+def _say_measurands(
+    given: Options, inspected: Inspection, distance: measure.Measurement | None, places: list[measure.Located]
+) -> NoReturn:
     """All measurands of a scene, and its distance edge by edge; exit status 1 where one could not be measured."""
     rows = measurands.facts(inspected)
     told, zones = {"measurands": rows, "covariance": measurands.covariance(inspected)}, measurands.zones(inspected)
@@ -232,6 +253,8 @@ def _say_measurands(given: Options, inspected: Inspection, distance: measure.Mea
         told["zones"] = zones
     if distance is not None:
         told |= _distance_facts(distance)
+    if places:
+        told["placements"] = [placement.facts(each) for each in places]
     if given.as_json:
         say({"file": str(given.file), **told}, True, "")
     else:
@@ -239,6 +262,8 @@ def _say_measurands(given: Options, inspected: Inspection, distance: measure.Mea
         shown.print(measurands.table(rows, zones))
         for line in legend([row["status"] for row in rows], measurands.reasons(rows, inspected)):
             shown.print(f" {line}", highlight=False)
+        for each in places:
+            shown.print(placement.text(each), highlight=False)
         if distance is not None:
             shown.print(_distance_text(distance, told["edges"]), highlight=False)
         if given.inspection is not None:

@@ -1,0 +1,156 @@
+"""Where the part lies in a picture: found anywhere within what is plausible, then adjusted from its datums."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from imaging.light.appearance import is_plain
+from imaging.placed import combined, placed
+from measure.estimators.registry import best_estimator
+from measure.measurement import DEFAULT_ESTIMATOR, checked_image
+from measure.quantities import MeasuredFeatures, find
+from measure.registration import Place, candidates, rivals
+from scenes import InvalidInput, Picture, Scene, status
+from scenes.arrays import picture as one_picture
+from scenes.placement import prior
+
+_STEPS = 6
+_SETTLED = 0.02  # px that an adjustment still moves a datum: what is not linear in it is then far below the noise
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """The place of a part in a picture.
+
+    Attributes
+    ----------
+    picture : Picture
+        The part where it lies to a few hundredths of a px, as `measure.measure` takes it, which adjusts the rest; as
+        the scene says where `status` is not ``ok``.
+    placement : ndarray, shape (6,)
+        Shift along x, y and z, the scene's unit, and rotation vector about the point that the camera looks at,
+        degrees.
+    covariance : ndarray, shape (6, 6)
+        Of the shift and of the rotation that is still missing, along the part's own axes; the scene's unit and degrees
+        squared. Infinite on the diagonal where it is not found.
+    status : str
+        ``ok``; ``ambiguous`` where another place explains the picture as well; ``not_visible`` where none does.
+    explained : float
+        Share of the model's visible edges on which a step of grey levels lies.
+    reason : str
+        Why it is not ``ok``; empty where it is.
+    """
+
+    picture: Picture
+    placement: np.ndarray
+    covariance: np.ndarray
+    status: str
+    explained: float
+    reason: str = ""
+
+
+def locate(
+    image: np.ndarray, scene: Scene | Picture, sensor: Any = None, light: Any = None, estimator: str | None = None
+) -> Located:
+    """Find the part in a picture, within what the scene says is plausible of its place.
+
+    Parameters
+    ----------
+    image : ndarray, shape (height, width)
+        Grey levels.
+    scene, sensor, light, estimator
+        As for `measure.measure`; the scene's placement is from datums.
+
+    Raises
+    ------
+    InvalidInput
+        If the scene does not say that the part's place is to be found.
+
+    Notes
+    -----
+    Coarsely by `measure.registration`, whose best places are compared; then by Gauss-Newton steps of the adjustment of
+    the datums (`imaging.features.placing`) until they settle.
+    """
+    picture = Picture.of(scene, sensor, light)
+    if not picture.scene.placement.is_estimated:
+        raise InvalidInput(f"placement.from must be datums to find the part, got {picture.scene.placement.source!r}")
+    camera = picture.scene.camera
+    levels = checked_image(one_picture(image), (camera.height, camera.width))
+    found = candidates(levels, picture)
+    if not found:
+        return _nowhere(picture, status.NOT_VISIBLE, "no place within what is plausible explains the picture", 0.0)
+    best, others = found[0], rivals(found)
+    if others:
+        return _nowhere(picture, status.AMBIGUOUS, _both(best, others[0]), best.explained)
+    return adjusted(levels, picture, best.placement, estimator, best.explained)
+
+
+def adjusted(
+    image: np.ndarray, picture: Picture, start: np.ndarray, estimator: str | None = None, explained: float = 1.0
+) -> Located:
+    """The place of a part that lies about at a start (6,), within the capture of the locator.
+
+    First by the gradient locator, which needs no lights; then, in plain scenes, by the estimator that is meant, which
+    may take levels from the lights.
+    """
+    here = before = np.asarray(start, float)
+    name = estimator or best_estimator(picture.scene)
+    passes = [(DEFAULT_ESTIMATOR, False)]
+    if name != DEFAULT_ESTIMATOR and is_plain(picture.scene) and picture.lights:
+        passes.append((name, True))
+    for method, lit in passes:
+        for _ in range(_STEPS):
+            there = placed(picture, here)
+            found = find(image[None], there if lit else there.unlit(), method)
+            step = _step(found, picture)
+            if not np.isfinite(step).all() or not _told(found).any():
+                return _nowhere(picture, status.NOT_VISIBLE, "none of its datums is found", explained)
+            before, here = here, combined(here, step)
+            if _moved(found) < _SETTLED:
+                break
+        else:
+            return _nowhere(picture, status.ILL_CONDITIONED, "its adjustment does not settle", explained)
+    return Located(placed(picture, before), here, _covariance(found, picture), status.OK, explained)
+
+
+def _told(found: MeasuredFeatures) -> np.ndarray:
+    """Which features of one image tell of the place, bool (q,)."""
+    variances = np.diagonal(found.of_datums[0])
+    return found.known.placing.datums & np.isfinite(variances) & np.isfinite(found.offsets[0])
+
+
+def _step(found: MeasuredFeatures, picture: Picture) -> np.ndarray:
+    """What the adjustment of one image says is still missing, (6,)."""
+    u, step = prior(picture.scene.uncertainty), np.zeros(6)
+    step[u > 0] = found.placement[0] * u[u > 0]
+    return step
+
+
+def _moved(found: MeasuredFeatures) -> float:
+    """How far that moves the datums' ends or radii at most, px."""
+    placing, seen = found.known.placing, found.known.seen
+    moved = placing.slopes @ found.placement[0]
+    lengths = np.linalg.norm(seen.along, axis=-1)
+    size = np.ones(seen.count)
+    size[1 : 2 * len(lengths) : 2] = lengths
+    for c in range(len(seen.circles)):
+        size[seen.numbers(c)] = seen.camera.focal_px / seen.divisor(seen.centres[c])
+    return float(np.abs(moved * size)[_told(found)].max(initial=0.0))
+
+
+def _covariance(found: MeasuredFeatures, picture: Picture) -> np.ndarray:
+    free = np.flatnonzero(prior(picture.scene.uncertainty) > 0)
+    whole = np.zeros((6, 6))
+    whole[np.ix_(free, free)] = found.adjustment.covariance()[0]
+    return whole
+
+
+def _nowhere(picture: Picture, state: str, reason: str, explained: float) -> Located:
+    return Located(picture, np.full(6, np.nan), np.diag(np.full(6, np.inf)), state, explained, reason)
+
+
+def _both(best: Place, other: Place) -> str:
+    return f"two places explain the picture equally well: {best}, and {other}"

@@ -1,0 +1,137 @@
+"""How the part's place is known: from a fixture alone, or found in the same picture by features of the part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from scenes.measurands.features import Centre, Side, Wall
+from scenes.measurands.form import forms_of
+from scenes.measurands.kinds import MEASURANDS
+from scenes.model import Model, Name
+from scenes.ranges import Coordinate, Spread
+
+if TYPE_CHECKING:
+    from scenes.scene import Scene
+    from scenes.uncertainty import Uncertainty
+
+COMPONENTS = (
+    *(f"part_shift.{axis}" for axis in "xyz"),
+    *(f"part_tilt_deg.{axis}" for axis in "xyz"),
+)
+"""What a placement is made of: a shift [length] and a rotation vector about ``camera.look_at`` [degrees]."""
+MOST_TILT = 15.0
+"""Degrees that the part's place may be off to either side about all axes but one, where it is found in a picture."""
+
+
+class Placement(Model):
+    """How it is known where the part lies, beside where the scene says.
+
+    How well that is known without the picture is said by ``uncertainty.part_shift`` and ``uncertainty.part_tilt_deg``.
+    """
+
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True, serialize_by_alias=True)
+
+    source: Literal["known", "uncertain", "datums"] = Field("known", alias="from")
+    """known: it lies as the scene says, and what that is not sure of is a source of the budget. uncertain: the same,
+    and plans and measurements count it too. datums: shift and tilt are estimated in the picture, together with the
+    measurands, from features of the part of which the model tells the places."""
+    datums: tuple[Name, ...] = ()
+    """Names of the part's straight edges and circles that tell where it lies; measurands may use them too."""
+    datum_sd: Spread | None = None
+    """Standard uncertainty of their places and radii on the part, each end and each direction independently: what the
+    manufacture leaves open [length]."""
+    expected: tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate] = (0.0,) * 6
+    """Shift along x, y, z [length] and rotation vector [degrees] that are expected, beside where the scene says."""
+
+    @property
+    def is_estimated(self) -> bool:
+        """Whether the picture tells it."""
+        return self.source == "datums"
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """Names of the datums, each once."""
+        return tuple(dict.fromkeys(self.datums))
+
+
+def prior(uncertainty: Uncertainty) -> np.ndarray:
+    """Standard uncertainties of a placement's six `COMPONENTS` before a picture is seen, shape (6,); 0: it is exact.
+
+    >>> from scenes.uncertainty import Uncertainty
+    >>> prior(Uncertainty(part_shift=[1, 2, 3])).tolist()
+    [1.0, 2.0, 3.0, 0.0, 0.0, 0.0]
+    """
+    return np.array([0.0 if told is None else told.u for told in uncertainty.of_part])
+
+
+def limits(uncertainty: Uncertainty) -> np.ndarray:
+    """How far a placement's components may plausibly be off, (6,): half widths, or three standard uncertainties."""
+    told = uncertainty.of_part
+    return np.array([0.0 if each is None else each.half_width or 3 * each.u for each in told])
+
+
+def check_placement(scene: Scene) -> None:
+    """See that a scene's placement can be what it says.
+
+    Raises
+    ------
+    ValueError
+        If not.
+    """
+    placement = scene.placement
+    if not placement.is_estimated:
+        for key in ("datums", "datum_sd"):
+            if getattr(placement, key):
+                raise ValueError(f"placement.{key} must be left out unless placement.from is datums, got it")
+    if placement.source == "known":
+        if any(placement.expected):
+            raise ValueError(f"placement.expected must be 0 where it is known, got {list(placement.expected)}")
+        return
+    if not prior(scene.uncertainty).any():
+        raise ValueError(
+            f"uncertainty.part_shift or part_tilt_deg must be more than 0 with placement.from = {placement.source!r}"
+            ", got none"
+        )
+    _check_scene(scene)
+    if placement.is_estimated:
+        _check_datums(scene)
+
+
+def _check_scene(scene: Scene) -> None:
+    """What the part's place is not estimated with."""
+    wrong = f"with placement.from = {scene.placement.source!r}"
+    if scene.task is not None:
+        raise ValueError(f"task must be left out {wrong}, and measurands listed, got one")
+    if scene.floor is not None or scene.obstacles:
+        raise ValueError(f"floor and obstacles must be left out {wrong}, which moves the part alone, got some")
+    if scene.textures:
+        raise ValueError(f"textures must be left out {wrong}, got {len(scene.textures)}")
+    for each in scene.quantities if scene.measurands else ():
+        curved = any(isinstance(feature, Wall) for feature in each.basic)
+        if curved or MEASURANDS[each.kind].extreme or each in forms_of((each,)):
+            raise ValueError(f"measurands must be of straight edges and circles {wrong}, got {each.name}")
+
+
+def _check_datums(scene: Scene) -> None:
+    placement, solid = scene.placement, scene.solid
+    if not placement.datums:
+        raise ValueError("placement.datums must be at least one edge or circle, got none")
+    if placement.datum_sd is None:
+        raise ValueError("placement.datum_sd must be given with datums, got nothing")
+    if np.sort(limits(scene.uncertainty)[3:])[1] > MOST_TILT:
+        raise ValueError(
+            f"uncertainty.part_tilt_deg must be limited to {MOST_TILT:g} degrees about two axes for datums, got more"
+        )
+    edges, rims = [edge.name for edge in solid.sharp], [each.name for each in solid.rims]
+    for name in placement.datums:
+        if name not in edges and name not in rims:
+            raise ValueError(f"placement.datums must be edges or circles of the part, got {name!r}")
+
+
+def datums_of(scene: Scene) -> tuple[Side | Centre, ...]:
+    """The features that tell where the part lies."""
+    rims = {each.name for each in scene.solid.circles} if scene.placement.datums else set()
+    return tuple(Centre(circle=name) if name in rims else Side(edge=name) for name in scene.placement.features)

@@ -1,0 +1,138 @@
+"""``python -m tests.proofs placements``: parts that lie anywhere are found, and place and values are known as told.
+
+Three convex parts at random places (shifts to 5 mm, heights to 2 mm, turns and tilts to 3 degrees), each exposed once
+by the image model (`imaging.blurred.whole`), with noise drawn anew. Each is found without a start, its place adjusted
+from its edges, its values measured. Pulls of place and values (error over told standard deviation) must have a spread
+of 1 within 5 % and a mean within 0.1. Two controls must fail: values with the variance of a known place, and variances
+1.3 times too large.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import measure
+import render
+from imaging.features.kinds import on_plane
+from imaging.placed import difference
+from measure.quantities import find, values
+from scenes import Picture, Scene
+from scenes.status import is_trusted
+from tests import placements as placed_parts
+
+FOUND, SPREAD, MEAN = 0.99, 0.05, 0.1
+
+
+@dataclass
+class Pulls:
+    """Of one part's places at random.
+
+    Attributes
+    ----------
+    tried, refused, wrong : int
+        Places that were drawn, that were refused, and that were found elsewhere (by more than six of their standard
+        deviations).
+    place, values, at_known : list of ndarray
+        Pulls of shift and rotation, of the values, and of these with the variance of a known place.
+    """
+
+    tried: int = 0
+    refused: int = 0
+    wrong: int = 0
+    place: list[np.ndarray] = field(default_factory=list)
+    values: list[np.ndarray] = field(default_factory=list)
+    at_known: list[np.ndarray] = field(default_factory=list)
+
+
+def one(picture: Picture, rng: np.random.Generator, found: Pulls) -> None:
+    """One place at random."""
+    there = placed_parts.drawn(rng)
+    (image,) = render.expose(placed_parts.seen(picture, there), picture.scene.noise, rng, 1)
+    found.tried += 1
+    where = measure.locate(image, picture)
+    if where.status != "ok":
+        found.refused += 1
+        return
+    pull = difference(there, where.placement) / np.sqrt(np.diag(where.covariance))
+    if np.abs(pull).max() > 6:
+        found.wrong += 1
+        return
+    told = measure.measure(image, where.picture)
+    if not is_trusted(told.status).all():
+        found.refused += 1
+        return
+    found.place.append(pull)
+    off = told.value - told.nominal
+    found.values.append(off / np.hypot(told.sigma, told.u_placed))
+    found.at_known.append(off / _at_known(image, where.picture))
+
+
+def _at_known(image: np.ndarray, picture: Picture) -> np.ndarray:
+    """Standard deviations (M,) of the values by noise, were the place known."""
+    told = find(image[None], picture, measure.best_estimator(picture.scene))
+    return np.sqrt(np.diag(values(told.seen, told.known.quantities, on_plane, told.errors).covariance[0]))
+
+
+def summary(name: str, scene: Scene, found: Pulls) -> bool:
+    """Printed, and whether it is as told."""
+    good = found.tried - found.refused - found.wrong
+    print(f"{name}: {good} of {found.tried} found, {found.refused} refused, {found.wrong} wrong")
+    place, of_values = np.array(found.place), np.array(found.values)
+    rows = [*zip(("x", "y", "z", "rx", "ry", "rz"), place.T, strict=True),
+            *zip([each.name for each in scene.quantities], of_values.T, strict=True)]  # fmt: skip
+    for label, pull in rows:
+        print(f"  {label:8} mean {pull.mean():+.3f}  spread {pull.std(ddof=1):.3f}")
+    control = np.array(found.at_known).std(0, ddof=1)
+    print(f"  as of a known place (must not be 1): {', '.join(f'{each:.2f}' for each in control)}")
+    return not found.wrong
+
+
+def held(every: list[Pulls]) -> bool:
+    """Whether all pulls together are as told, and the controls are not; printed."""
+    tried = sum(each.tried for each in every)
+    found = sum(len(each.place) for each in every)
+    place = np.concatenate([np.array(each.place) for each in every])
+    of_values = [pull for each in every for pull in np.array(each.values).T]
+    known = [pull for each in every for pull in np.array(each.at_known).T]
+    rows = [("place", place.ravel()), ("values", np.concatenate(of_values))]
+    for label, pull in rows:
+        chance = 1 / np.sqrt(2 * pull.size)
+        told = f"mean {pull.mean():+.3f}, spread {pull.std():.3f}"
+        print(f"{label}: {pull.size} pulls, {told} (chance {chance:.3f}, were they independent)")
+    print(f"found {found} of {tried}")
+    good = found >= FOUND * tried and not sum(each.wrong for each in every)
+    good &= all(is_as_told(pull) for _, pull in rows)
+    controls = [is_as_told(pull / np.sqrt(1.3)) for _, pull in rows] + [is_as_told(np.concatenate(known))]
+    print(f"controls that pass and must not: {sum(controls)} of {len(controls)}")
+    return good and not any(controls)
+
+
+def is_as_told(pull: np.ndarray) -> bool:
+    """Whether pulls have a spread of 1 within 5 % and no mean beyond 0.1."""
+    return bool(abs(pull.std() - 1) < SPREAD and abs(pull.mean()) < MEAN)
+
+
+def placements(
+    places: Annotated[int, typer.Option(help="Places of each part.")] = 334,
+    seed: Annotated[int, typer.Option()] = 1,
+    only: Annotated[str, typer.Option(help="Parts whose names begin so.")] = "",
+) -> None:
+    """Three parts at 1000 random places: found, and place and values as well known as told; an hour."""
+    every, good = [], True
+    with tempfile.TemporaryDirectory() as folder:
+        for k, name in enumerate(placed_parts.CORNERS):
+            if not name.startswith(only):
+                continue
+            scene, found = placed_parts.scene(Path(folder), name), Pulls()
+            picture, rng = Picture.of(scene, placed_parts.SENSOR, placed_parts.LIGHT), np.random.default_rng((seed, k))
+            for _ in range(places):
+                one(picture, rng, found)
+            good &= summary(name, scene, found)
+            every.append(found)
+    raise typer.Exit(0 if held(every) and good else 1)
