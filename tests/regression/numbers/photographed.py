@@ -194,7 +194,9 @@ def _correlation():
         "seen": seen.correlation, "curve": seen.curve, "is white": [seen.correlation.white, white.correlation.white],
         "white": white.correlation, "none": none, "covariance": one.covariance(
             rows.reshape(2, -1)[:, flat], flat, sigma.ravel()[flat], 40),
-        "of many": one.covariance_of_many(sparse, sigma), "system": shared._system(), "lags": shared._lags(),
+        "of many": one.covariance_of_many(sparse, sigma),
+        "system": shared._system(shared._lags(), shared.SIDE),
+        "lags": shared._lags(),
         "beside": [beside.correlation, beside.curve, len(beside.patches.level), beside.compressed, beside.status],
     }  # fmt: skip
 
