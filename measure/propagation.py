@@ -209,10 +209,10 @@ def _of_lines(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
         if isinstance(tool, SeparateEstimator):
             near = tool.respond_within(clean, asked=_is_in_place(found, layout, estimator))
+            near[np.repeat(torn(clean, layout, estimator, limit), 2)] = np.nan
         else:
             near = tool.respond_within(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
-    measured &= ~torn(clean, layout, estimator, limit)
     near[np.repeat(~measured, 2)] = np.nan
     if not tool.pixels.size:
         return _none(len(near), clean.size)

@@ -8,6 +8,7 @@ from functools import lru_cache
 from weakref import finalize
 
 import numpy as np
+from scipy.special import ndtr
 
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.estimate import Estimate, Estimator
@@ -26,8 +27,8 @@ _PASSES = 6
 _BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
 _KEPT = 64  # estimators
 _TOOLS: OrderedDict[tuple[int, str, float], Estimator | ArrangementEstimator] = OrderedDict()
-_DOUBT = 4.0  # standard deviations from that reach within which noise may take an edge to either side of it
-_ELSEWHERE = 0.3  # of a standard deviation, that `ok` allows a bias
+_RARE = 1e-6  # probability below which no image is looked at from elsewhere
+_BIASED, _SCATTERED = 0.3, 0.25  # of a standard deviation and of a variance: more of a mixture is another law
 _LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
 
 
@@ -105,22 +106,24 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
 def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float) -> np.ndarray:
     """Of which edges noise decides from where they are looked for, and with it where they are found, bool (E,).
 
-    In a noise-free image (height, width) whose edges lie about as far from their expected places as an estimator
-    reaches, by far less than noise moves them.
+    In a noise-free image (height, width) some edge of which lies about as far from its expected place as an estimator
+    reaches: by chance it is beyond, and all are looked for from where they seem. Where that moves an edge by so much
+    that its mean, or its variance, is another one than propagation tells.
     """
     tool, images = prepared(layout, name, threshold), clean[None]
     estimate = tool.estimate(images)
     offsets, errors = _at_ends(tool, estimate, tool.covariance(estimate, images))
-    with np.errstate(invalid="ignore"):
-        doubtful = np.abs(np.abs(offsets) - _capture(name, errors)) < _DOUBT * errors
-    if not doubtful.any() or any(caliper.status not in status.MEASURED for caliper in tool.calipers):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beyond = ndtr(-np.abs(np.abs(offsets) - _capture(name, errors)) / errors)  # or within, of those that are beyond
+        chance = 1 - np.prod(1 - np.nan_to_num(beyond))
+    if chance < _RARE or any(caliper.status not in status.MEASURED for caliper in tool.calipers):
         return np.zeros(len(layout.names), bool)
     key = np.round(np.clip(offsets[0], -1, 1) / _GRID) * _GRID
     other = _find(images, _shifted(layout, tuple(key.ravel().tolist())), name, threshold, 0)
     ends = np.array([caliper.at(np.array([0.0, caliper.length]), np.zeros(2)) for caliper in tool.calipers])
     there = np.einsum("ei,eki->ek", other.normals[0], other.points[0][:, None] - ends)
-    with np.errstate(invalid="ignore"):
-        return ~(np.abs(there - offsets[0]) <= _ELSEWHERE * errors[0]).all(-1)
+    moved = np.nan_to_num(np.abs(there - offsets[0]) / errors[0])  # what is not found there fails, and is counted so
+    return ((chance * moved > _BIASED) | (chance * (1 - chance) * moved**2 > _SCATTERED)).any(-1)
 
 
 def _at_ends(tool: Estimator, estimate: Estimate, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,13 @@ def test_only_what_is_measured_has_a_value(lead, task1, rng, monkeypatch):
     known = SimpleNamespace(quantities=quantities, value_object=np.array([1.0, 2.0, 3.0]))
     p_value = rng.random(images)
     found = SimpleNamespace(
-        known=known, status=status, image=image, plane=plane, shape=SimpleNamespace(p_value=p_value), forms={}
+        known=known,
+        status=status,
+        image=image,
+        plane=plane,
+        shape=SimpleNamespace(p_value=p_value),
+        forms={},
+        placed=np.einsum("ni,nj->nij", *[rng.random((images, 3))] * 2),
     )
     first = object()
     monkeypatch.setattr(measurands, "of_first", lambda *given: (first, *given))
@@ -32,6 +38,7 @@ def test_only_what_is_measured_has_a_value(lead, task1, rng, monkeypatch):
     told = measurands._gathered(found, picture, saturated, lead)
     assert told.saturated.tolist() == saturated.reshape(lead).tolist()
     assert told.u_bias.shape == (*lead, 3)
+    assert (told.u_placed**2).ravel() == pytest.approx(found.placed[:, range(3), range(3)].ravel())
     assert told.first == (first, found, picture, lead)
     assert told.units == ("cm",) * 3
     own = quantity.nominal if quantity.nominal is not None else 1.0

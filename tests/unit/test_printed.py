@@ -19,6 +19,7 @@ from planner.design import Choice
 from render import EffectTolerance
 from render.phenomena import Decision, Influence
 from scenes import Pose, Tolerance
+from scenes.placement import Placement
 from tests.boards import SMALL, poses, told
 from tests.sides import sides
 from validation import budgets
@@ -122,7 +123,7 @@ def test_measured_values_and_their_decisions_are_printed():
     quantity = SimpleNamespace(name="slot", kind="width", tolerance=Tolerance(plus=0.09, minus=0.02))
     other = SimpleNamespace(name="lean", kind="angle", tolerance=None)
     found = SimpleNamespace(
-        picture=SimpleNamespace(scene=SimpleNamespace(zones=())),
+        picture=SimpleNamespace(scene=SimpleNamespace(zones=(), placement=Placement())),
         quantities=(quantity, other), sigma=np.array([0.0024, 0.5]),
         covariance=np.array([[5.76e-6, 2e-4], [2e-4, 0.25]]),
         u=np.array([0.004, np.nan]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
