@@ -71,12 +71,17 @@ class MeasuredFeatures:
     @cached_property
     def plane(self) -> Values:
         """On the planes of the features: the scene's unit, degrees; the part's place adjusted where it is not known."""
-        found = values(self.seen, self.known.quantities, on_plane, self.errors)
+        found = self.at_known
         if self.adjustment is None:
             return found
         moved = np.einsum("nmk,nk->nm", self.adjustment.pulls(found.gradient), self.placement)
         gradient = self.adjustment.gradient(found.gradient)
         return Values(found.value - moved, gradient, _spread(gradient, self.errors))
+
+    @cached_property
+    def at_known(self) -> Values:
+        """The same of a part whose place is known."""
+        return values(self.seen, self.known.quantities, on_plane, self.errors)
 
     @cached_property
     def adjustment(self) -> Adjustment | None:
@@ -106,7 +111,7 @@ class MeasuredFeatures:
         count = len(self.known.quantities)
         if self.adjustment is None:
             return np.zeros((len(self.status), count, count))
-        return self.adjustment.placed(values(self.seen, self.known.quantities, on_plane, self.errors).gradient)
+        return self.adjustment.placed(self.at_known.gradient)
 
     @cached_property
     def offsets(self) -> np.ndarray:
@@ -180,11 +185,12 @@ def find(
 def _placed_states(found: MeasuredFeatures) -> np.ndarray:
     """The statuses (n, M), with what the adjustment of the part's place says of its datums."""
     placing, quantities = found.known.placing, found.known.quantities
-    at_known = values(found.seen, quantities, on_plane, found.errors).gradient
     squares, freedom = placing.squares(found.of_datums, found.offsets)
     fits = chdtrc(np.maximum(freedom, 1), squares) >= WORST  # less than expected is a datum_sd on the safe side
     variances = np.einsum("nmm->nm", found.plane.covariance)
-    untold = found.adjustment.matters(at_known, variances, quantities) if placing.features else ~fits[:, None]
+    untold = (
+        found.adjustment.matters(found.at_known.gradient, variances, quantities) if placing.features else ~fits[:, None]
+    )
     said = np.where(untold, status.UNPLACED, np.where(fits[:, None], status.OK, status.MISFIT))
     pairs = zip(found.status.ravel(), np.broadcast_to(said, found.status.shape).ravel(), strict=True)
     return np.array([status.worst(*pair) for pair in pairs]).reshape(found.status.shape)

@@ -96,7 +96,7 @@ def plan_views(
     aim = _aim(scene, count, objective, over, model, share)
     if len(scene.lights) != 1 or not scene.free:
         raise InvalidInput(f"lights must be one that is free, for several pictures, got {len(scene.lights)} light(s)")
-    if scene.placement.source != "known":
+    if not scene.placement.is_known:
         raise InvalidInput(f"placement.from must be known for several pictures, got {scene.placement.source!r}")
     report, limits = report or (lambda *_: None), (constraints or Constraints()).on_side_of(scene)
     problem = SearchProblem(scene, model, aim, limits)

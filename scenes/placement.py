@@ -47,6 +47,11 @@ class Placement(Model):
     """Shift along x, y, z [length] and rotation vector [degrees] that are expected, beside where the scene says."""
 
     @property
+    def is_known(self) -> bool:
+        """Whether it counts as where the scene says."""
+        return self.source == "known"
+
+    @property
     def is_estimated(self) -> bool:
         """Whether the picture tells it."""
         return self.source == "datums"
@@ -86,7 +91,7 @@ def check_placement(scene: Scene) -> None:
         for key in ("datums", "datum_sd"):
             if getattr(placement, key):
                 raise ValueError(f"placement.{key} must be left out unless placement.from is datums, got it")
-    if placement.source == "known":
+    if placement.is_known:
         if any(placement.expected):
             raise ValueError(f"placement.expected must be 0 where it is known, got {list(placement.expected)}")
         return

@@ -56,7 +56,7 @@ class Placing:
     @classmethod
     def of(cls, scene: Scene, seen: Seen) -> Placing | None:
         """That of a scene's features as they are expected; None where their place is known."""
-        if scene.placement.source == "known":
+        if scene.placement.is_known:
             return None
         u = prior(scene.uncertainty)
         free = np.flatnonzero(u > 0)

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
+from measure.boards.fitting import solved
+
 _STEPS, _SETTLED = 20, 3e-3  # of Gauss and Newton; px of a centre's last step, whose error is about the square
 _LARGEST = 0.5  # px, or times the size, of one step
 _BLURS = 0.25, 8.0  # px, of an edge's profile
@@ -55,7 +57,7 @@ def _fit(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> Dots:
     live = np.arange(len(start))
     for _ in range(_STEPS):
         matrix, residual, _ = _linear(place[live], levels[live], there[live], values[live])
-        step = _solved(matrix, residual)[0][:, :6]
+        step = solved(matrix, residual)[0][:, :6]
         back = (step[:, :2] * before[live]).sum(1, keepdims=True) < 0
         damping[live] = np.where(back, damping[live] / 2, np.minimum(1.5 * damping[live], 1.0))
         most = _LARGEST * _scale(np.abs(values[live, 2:5]).max(1, keepdims=True))
@@ -67,7 +69,7 @@ def _fit(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> Dots:
             break
     rest = ~np.isin(np.arange(len(start)), live)
     matrix, residual, best = _linear(place, levels, there, values)
-    inverse = _solved(matrix, residual)[1]
+    inverse = solved(matrix, residual)[1]
     determinant = values[:, 2] * values[:, 4] - values[:, 3] ** 2
     good = rest & (determinant > 0) & np.isfinite(residual).all(1) & (values[:, 5] < _BLURS[1])
     radius = np.where(determinant > 0, np.abs(determinant), 1.0) ** -0.25
@@ -111,19 +113,9 @@ def _linear(place, levels, there, values) -> tuple[np.ndarray, np.ndarray, np.nd
     away = (q - 1) / steep / blur
     covered, density = ndtr(-away), np.exp(-(away**2) / 2) / np.sqrt(2 * np.pi)
     basis = np.concatenate([np.ones((*q.shape, 1)), u / 10.0, covered[..., None]], -1) * there[..., None]
-    best = _solved(basis, levels)[0]
+    best = solved(basis, levels)[0]
     residual = np.where(there, levels - np.einsum("npk,nk->np", basis, best), 0.0)
     inward = best[:, 3:4] * density / blur * there  # of the level by the distance
     by_shape = -np.stack([u[..., 0] ** 2, 2 * u[..., 0] * u[..., 1], u[..., 1] ** 2], -1) / (2 * q * steep)[..., None]
     slopes = np.concatenate([pulled / (q * steep)[..., None], by_shape, away[..., None]], -1) * inward[..., None]
     return np.concatenate([slopes, basis], -1), residual, best
-
-
-def _solved(matrix: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least squares for each of n, columns scaled; and the inverse normal matrix."""
-    size = np.sqrt((matrix**2).sum(1))
-    size = np.where(size > 0, size, 1.0)
-    unit = matrix / size[:, None]
-    inverse = np.linalg.pinv(unit.transpose(0, 2, 1) @ unit, rcond=1e-12, hermitian=True)
-    inverse = inverse / size[:, :, None] / size[:, None]
-    return np.einsum("nij,npj,np->ni", inverse, matrix, right, optimize=True), inverse

@@ -71,7 +71,7 @@ def crossing_rows(found: Windows, shape: np.ndarray, bend: np.ndarray) -> np.nda
         field = np.where(there[..., None], _field(places, shape[s]), 0.0)
         matrix, residual, *_ = _linear(places, levels, there, shape[s], bend[s], field)
         matrix[np.isin(shape[s][:, 4], _BLURS), :, 4] = 0.0
-        rows.append(np.einsum("nij,npj->nip", _solved(matrix, residual)[1][:, :2], matrix))
+        rows.append(np.einsum("nij,npj->nip", solved(matrix, residual)[1][:, :2], matrix))
     return np.concatenate(rows)
 
 
@@ -83,7 +83,7 @@ def _fit(places, levels, there, shape, bend, enough) -> tuple[np.ndarray, ...]:
     for _ in range(_STEPS):
         matrix, residual, square, contrast = _linear(places, levels, there, shape, bend, field)
         matrix[np.isin(shape[:, 4], _BLURS), :, 4] = 0.0  # a blur at its end stays there
-        step, inverse = _solved(matrix, residual)
+        step, inverse = solved(matrix, residual)
         back = (step[:, :2] * before).sum(1, keepdims=True) < 0
         damping = np.where(back, damping / 2, np.minimum(1.5 * damping, 1.0))  # to and fro: where no model fits well
         step = damping * np.clip(step[:, :SHAPE], -_LARGEST, _LARGEST)
@@ -107,14 +107,14 @@ def _linear(places, levels, there, shape, bend, field):
     told = response(places, shape, bend)
     signs = np.concatenate([np.ones((*there.shape, 1)), told.signs], -1)
     basis = (signs[..., None] * field[..., None, :]).reshape(*there.shape, _LEVELS)
-    best, _ = _solved(basis, levels)
+    best, _ = solved(basis, levels)
     fields = np.einsum("npj,nkj->npk", field, best.reshape(-1, 4, 3))
     slopes = np.einsum("npk,npks->nps", fields[..., 1:], told.slopes)
     residual = np.where(there, levels - np.einsum("npj,nj->np", basis, best), 0.0)
     return np.concatenate([slopes, basis], -1), residual, (residual**2).sum(1), np.abs(best[:, 9])
 
 
-def _solved(matrix: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def solved(matrix: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least squares for each of n, columns scaled; and the inverse normal matrix."""
     size = np.sqrt((matrix**2).sum(1))
     size = np.where(size > 0, size, 1.0)

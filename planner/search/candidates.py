@@ -198,7 +198,7 @@ class RayTraced(NamedTuple):
         """Of a sensor (2,) and the free lights (2 F,), degrees."""
         told = predict(problem.scene, tuple(map(float, sensor)), as_poses(light), problem.model)
         variances = np.array([getattr(each, f"variance_{problem.objective.unit}") for each in told.measurands])
-        if problem.scene.placement.source != "known" and problem.objective.unit == "object":
+        if not problem.scene.placement.is_known and problem.objective.unit == "object":
             variances = variances + variance_model(problem.model)(Pictures.of(told.picture)).placed
         untrusted = sum(not is_trusted(each.status) for each in told.measurands)
         return cls(sensor, light, told, float(problem.objective(variances)), untrusted)

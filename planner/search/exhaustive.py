@@ -71,7 +71,7 @@ class BestPair:
 
 def has_bound(scene: Scene, model: str) -> bool:
     """Whether the fast search applies: a separable scene, straight edges only, a part whose place is known."""
-    placed = scene.placement.source == "known"
+    placed = scene.placement.is_known
     return placed and is_separable(scene) and lines_alone(scene) and model in ("paper", "calibrated")
 
 

@@ -96,7 +96,7 @@ class Shared:
 def applies(scene: Scene, model: str) -> bool:
     """Whether contrasts of single lights tell of mixtures: the calibrated model, straight edges, two lights, and a part
     whose place is known."""
-    return scene.placement.source == "known" and model == "calibrated" and lines_alone(scene) and len(scene.lights) == 2
+    return scene.placement.is_known and model == "calibrated" and lines_alone(scene) and len(scene.lights) == 2
 
 
 def best_lights(problem: SearchProblem, grid: Grid, shares: str, report: Report) -> Shared:

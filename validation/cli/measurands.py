@@ -50,7 +50,7 @@ def facts(inspected: Inspection) -> list[dict[str, Any]]:
 def _of_some(found: measure.Measurements, row: Inspected, k: int, pictures: int, good: bool) -> dict[str, Any]:
     """What is told only of several pictures, and of a part whose place counts."""
     several = {"picture": row.picture} if pictures > 1 else {}
-    if found.picture.scene.placement.source == "known":
+    if found.picture.scene.placement.is_known:
         return several
     return several | {"u_placed": found.u_placed[k] if good else None}
 
