@@ -97,15 +97,26 @@ def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | 
     """
     image = picture(image)
     shape = check_shape(shape)
-    number = isinstance(noise, int | float | np.number) and not isinstance(noise, bool)
-    if noise is not None and not (number and _LEAST_NOISE <= noise <= BRIGHTEST):
-        raise InvalidInput(f"noise must be a number more than 0 and at most {BRIGHTEST:g}, got {noise!r}")
+    check_noise(noise)
     grid = approximate_corners(image, shape)
     if grid is None:
         wanted = f"of {shape[0]} x {shape[1]} inner corners" if shape else "of at least 3 x 3 inner corners"
         raise InvalidInput(f"image must show a whole chessboard {wanted}, got none")
     noise = noise_sigma(image) if noise is None else float(noise)
     return measured(image, grid, max(noise, _least_noise(image)))
+
+
+def check_noise(noise: Any) -> None:
+    """See that a standard deviation of white noise, if given, is a number that squares are told from zero of.
+
+    Raises
+    ------
+    InvalidInput
+        If not.
+    """
+    number = isinstance(noise, int | float | np.number) and not isinstance(noise, bool)
+    if noise is not None and not (number and _LEAST_NOISE <= noise <= BRIGHTEST):
+        raise InvalidInput(f"noise must be a number more than 0 and at most {BRIGHTEST:g}, got {noise!r}")
 
 
 def check_shape(shape: Any) -> tuple[int, int] | None:

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from scipy.special import chdtrc
 
-from measure.boards.chessboard import Board, check_shape
+from measure.boards.chessboard import Board, check_noise, check_shape
 from measure.boards.dot_fitting import fit_dots
 from measure.photo.noise import noise_sigma
 from scenes import status
-from scenes.arrays import BRIGHTEST, picture
+from scenes.arrays import picture
 from scenes.errors import InvalidInput
 
 _LEAST_AREA, _FEWEST = 12.0, 9  # px^2 of a dot, and how many make a grid
@@ -50,8 +50,7 @@ def dot_grid(image: Any, shape: tuple[int, int] | None = None, noise: float | No
         If there is no such grid in the image, or an argument is bad.
     """
     image, shape = picture(image), check_shape(shape)
-    if noise is not None and not (isinstance(noise, int | float | np.number) and 1e-150 <= noise <= BRIGHTEST):
-        raise InvalidInput(f"noise must be a number more than 0 and at most {BRIGHTEST:g}, got {noise!r}")
+    check_noise(noise)
     noise = max(noise_sigma(image), _ROUNDING**0.5) if noise is None else float(noise)
     found = [_ordered(_blots(image, bright)) for bright in (False, True)]
     grid = max(found, key=lambda each: np.isfinite(each[..., 0]).sum())
