@@ -18,6 +18,7 @@ from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -66,13 +67,35 @@ class Step:
     rows: list[dict[str, Any]] = field(default_factory=list)
 
 
-def run(command: str, *arguments: object) -> tuple[Step, dict[str, Any]]:
+@dataclass(frozen=True)
+class Asked:
+    """What is done with each part.
+
+    Attributes
+    ----------
+    until : str
+        The last command.
+    skipped : tuple of str
+        Of ``show``, ``render`` and ``measure`` what is left out, for what follows does not need it.
+    renders : int
+        Of the first measurands.
+    seconds : int
+        Most of a command's processor.
+    """
+
+    until: str = COMMANDS[-1]
+    skipped: tuple[str, ...] = ()
+    renders: int = 200
+    seconds: int = MOST_SECONDS
+
+
+def run(seconds: int, command: str, *arguments: object) -> tuple[Step, dict[str, Any]]:
     """An ``ice`` command, and the document that it prints; empty where it prints none."""
     line = [sys.executable, "-P", "-m", "validation.cli.main", "-q", command, *map(str, arguments), "--json"]
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
         process = subprocess.Popen(line, stdout=out, stderr=err)
-        resource.prlimit(process.pid, resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS + 1))
-        watch = threading.Timer(PATIENCE * MOST_SECONDS, process.kill)
+        resource.prlimit(process.pid, resource.RLIMIT_CPU, (seconds, seconds + 1))
+        watch = threading.Timer(PATIENCE * seconds, process.kill)
         watch.start()
         _, status, usage = os.wait4(process.pid, 0)
         watch.cancel()
@@ -87,43 +110,50 @@ def run(command: str, *arguments: object) -> tuple[Step, dict[str, Any]]:
     return Step(command, process.returncode, seconds, size, told), document
 
 
-def steps(part: Path, folder: Path, renders: int) -> Iterator[Step]:
+def steps(part: Path, folder: Path, asked: Asked) -> Iterator[Step]:
     """All of a part, as far as it goes; each when it is asked for."""
-    scene, picture, few = folder / "part.toml", folder / "part.png", folder / "few.toml"
-    made, facts = run("new", part, "-o", scene)
-    asked = facts.get("measurands", [])
-    good = sum(each["status"] == "ok" for each in asked)
-    yield _told(made, f"{good} of {len(asked)} ok")
+    scene, ice = folder / "part.toml", partial(run, asked.seconds)
+    made, facts = ice("new", part, "-o", scene)
+    wanted = facts.get("measurands", [])
+    yield _told(made, f"{sum(each['status'] == 'ok' for each in wanted)} of {len(wanted)} ok")
     if made.status:
         return
-    shown, _ = run("show", scene, "-o", folder / "names.png")
-    yield _told(shown, "")
-    if not asked:
+    if "show" not in asked.skipped:
+        yield ice("show", scene, "-o", folder / "names.png")[0]
+    if not wanted:
         return
-    planned, plan = run("plan", scene, "--step", 15, "--no-check")
+    planned, plan = ice("plan", scene, "--step", 15, "--no-check")
     yield _told(planned, f"worst {_worst(plan)}")
     if planned.status:
         return
-    poses = [",".join(map(repr, plan[role])) for role in ("sensor", "light")]
-    rendered, _ = run("render", scene, "--sensor", poses[0], "--light", poses[1], "--noise-seed", 1, "-o", picture)
-    yield _told(rendered, "")
-    measured, values = run("measure", picture, scene, "--sensor", poses[0], "--light", poses[1])
-    found = values.get("measurands", [])
-    yield replace(_told(measured, _measured(found)), rows=[{key: row.get(key) for key in _VALUE} for row in found])
+    poses = [f"--{role}={','.join(map(repr, plan[role]))}" for role in ("sensor", "light")]
+    yield from _one_picture(scene, poses, asked)
+    few = folder / "few.toml"
     few.write_text(_only(scene.read_text("utf-8"), plan), "utf-8")
-    judged, verdict = run("validate", few, "--renders", renders, "--out", folder / "run", "--estimators", "gradient")
+    judged, verdict = ice(
+        "validate", few, "--renders", asked.renders, "--out", folder / "run", "--estimators", "gradient"
+    )
     found = [row for setting in verdict.get("settings", []) for row in setting["measurands"]]
     told = verdict.get("verdict", "").split(";")[0]
     yield replace(_told(judged, told), rows=[{key: row.get(key) for key in _VALIDATED} for row in found])
 
 
+def _one_picture(scene: Path, poses: list[str], asked: Asked) -> Iterator[Step]:
+    """Rendered and measured, as far as asked for."""
+    picture = scene.with_suffix(".png")
+    if "render" in asked.skipped:
+        return
+    yield run(asked.seconds, "render", scene, *poses, "--noise-seed", 1, "-o", picture)[0]
+    if "measure" in asked.skipped:
+        return
+    measured, values = run(asked.seconds, "measure", picture, scene, *poses)
+    found = values.get("measurands", [])
+    yield replace(_told(measured, _measured(found)), rows=[{key: row.get(key) for key in _VALUE} for row in found])
+
+
 def _told(step_: Step, told: str) -> Step:
     """A command's result in short where it has one."""
-    return step_ if step_.status == 2 or step_.told.startswith("internal") or not told else _with(step_, told)
-
-
-def _with(step_: Step, told: str) -> Step:
-    return replace(step_, told=told)
+    return step_ if step_.status == 2 or step_.told.startswith("internal") or not told else replace(step_, told=told)
 
 
 def _worst(plan: dict[str, Any]) -> str:
@@ -158,6 +188,10 @@ def corpus(
     sample: Annotated[int, typer.Option(help="Only so many files, drawn with the seed; 0: all.")] = 0,
     seed: Annotated[int, typer.Option()] = 1,
     until: Annotated[str, typer.Option(help=f"The last command: {', '.join(COMMANDS)}.")] = COMMANDS[-1],
+    skip: Annotated[
+        list[str] | None, typer.Option(help="show, render (and measure) or measure; several times.")
+    ] = None,
+    seconds: Annotated[int, typer.Option(help="Most that a command may take of its processor.")] = MOST_SECONDS,
     log: Annotated[Path, typer.Option(help="What is done; begun anew where it is not there.")] = Path("corpus.jsonl"),
     jobs: Annotated[int, typer.Option(help="Parts at a time.")] = 1,
 ) -> None:
@@ -166,9 +200,12 @@ def corpus(
     if sample:
         files = [files[k] for k in np.random.default_rng(seed).permutation(len(files))[:sample]]
     known = {row["part"] for row in map(json.loads, log.read_text("utf-8").splitlines())} if log.exists() else set()
-    parts = {str(part.relative_to(folder)): part for part in files}
+    parts, asked = (
+        {str(part.relative_to(folder)): part for part in files},
+        Asked(until, tuple(skip or ()), renders, seconds),
+    )
     with ThreadPoolExecutor(jobs) as pool:  # of threads: each command is a process of its own
-        names = {pool.submit(_taken, part, until, renders): name for name, part in parts.items() if name not in known}
+        names = {pool.submit(_taken, part, asked): name for name, part in parts.items() if name not in known}
         for number, done in enumerate(as_completed(names), 1):
             name, rows = names[done], done.result()
             with log.open("a", encoding="utf-8") as file:
@@ -177,9 +214,9 @@ def corpus(
     print(table([json.loads(line) for line in log.read_text("utf-8").splitlines()]))
 
 
-def _taken(part: Path, until: str, renders: int) -> list[dict[str, Any]]:
+def _taken(part: Path, asked: Asked) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as place:
-        return [asdict(each) for each in _upto(until, steps(part, Path(place), renders))]
+        return [asdict(each) for each in _upto(asked.until, steps(part, Path(place), asked))]
 
 
 def _upto(last: str, made: Iterator[Step]) -> Iterator[Step]:
