@@ -188,13 +188,15 @@ def corrected(found: Measurements, correction: Correction, image: np.ndarray) ->
     told = zip(found.status.reshape(-1, shape[-1]), of, u_bias, strict=True)
     states = np.array([correction.status_of(*each) for each in told]).reshape(shape)
     off, off_image = (np.nan_to_num(each).reshape(shape) for each in (off, off_image))
-    doubtful = np.isin(found.status, (status.CLUTTER, status.MISFIT))
+    doubtful, measured = np.isin(found.status, (status.CLUTTER, status.MISFIT)), np.isin(states, status.MEASURED)
+    spread = _scaled(found.covariance, correction.covariance, doubtful)
+    spread_image = _scaled(found.covariance_image, correction.covariance_image, doubtful)
     return replace(
         found,
-        value=found.value - off,
-        value_image=found.value_image - off_image,
-        covariance=_scaled(found.covariance, correction.covariance, doubtful),
-        covariance_image=_scaled(found.covariance_image, correction.covariance_image, doubtful),
+        value=np.where(measured, found.value - off, np.nan),
+        value_image=np.where(measured, found.value_image - off_image, np.nan),
+        covariance=_known(spread, measured),
+        covariance_image=_known(spread_image, measured),
         status=states,
         first=found.first and _first_corrected(found.first, off_image[..., 0], states[..., 0]),
         bias=off,
@@ -203,10 +205,14 @@ def corrected(found: Measurements, correction: Correction, image: np.ndarray) ->
 
 
 def _first_corrected(first: Measurement, bias: np.ndarray, states: np.ndarray) -> Measurement:
-    measured = np.isfinite(first.value_px)
+    measured = np.isfinite(first.value_px) & np.isin(states, status.MEASURED)
     return replace(
-        first, value_px=first.value_px - bias, bias_px=np.where(measured, bias, 0.0), status=states
-    )  # fmt: skip
+        first,
+        value_px=np.where(measured, first.value_px - bias, np.nan),
+        variance_px2=np.where(measured, first.variance_px2, np.inf),
+        bias_px=np.where(measured, bias, 0.0),
+        status=states,
+    )
 
 
 def _scaled(covariance: np.ndarray, propagated: np.ndarray, which: np.ndarray) -> np.ndarray:
@@ -260,6 +266,6 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
 
 
 def _known(covariance: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    both = measured[:, :, None] & measured[:, None, :]
-    lost = np.where(np.eye(measured.shape[1], dtype=bool), np.inf, np.nan)
+    both = measured[..., :, None] & measured[..., None, :]
+    lost = np.where(np.eye(measured.shape[-1], dtype=bool), np.inf, np.nan)
     return np.where(both, covariance, lost)

@@ -54,6 +54,19 @@ def test_what_needs_no_image_counts_in_the_object_and_in_the_image_as_it_is_told
     assert off.sources_image["light_place"].tolist() == [0.5]
 
 
+def test_what_its_simulation_cannot_measure_has_no_value(picture, exact):
+    """Beside a status that says so stands no number, in the object, in the image, or of the distance alone."""
+    good, lost = (
+        measure.measure(exact, picture, correction=_made(picture, simulated=(state,)))
+        for state in ("ok", "ill_conditioned")
+    )
+    assert (good.status[0], lost.status[0], lost.first.status.item()) == ("ok", "ill_conditioned", "ill_conditioned")
+    for name, given in (("value", good), ("value_image", good), ("value_px", good.first)):
+        assert np.isfinite(getattr(given, name)).all()
+        assert np.isnan(getattr(lost if given is good else lost.first, name)).all()
+    assert np.isinf(lost.sigma).all() and np.isinf(lost.covariance_image).all() and np.isinf(lost.first.variance_px2)
+
+
 def test_renders_beside_tell_the_noise_and_nothing_of_the_bias(small_task1, picture, exact):
     """Of a sensor that stands 0.05 degrees aside the other image is: the bias stays that of the first alone."""
     other = block_image(small_task1, (30.05, 90), (15, 270))
