@@ -24,6 +24,8 @@ from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.irradiance import beam
 from imaging.light.kept import kept
+from imaging.light.nodes import Frame, along, frame_of, goes_on, onto
+from imaging.light.places import Places, areas_of, in_unit_square, middles_of, of_sequence, ways_about
 from scenes import Floor, Scene, Solid
 from scenes.parts.solid import assembled
 
@@ -37,9 +39,7 @@ _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is 
 _ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly
 _ROUGH_PATCHES = 4  # about a small face, whose light is then a mean of theirs
 _REFLECTED = 128  # rays of a place that is asked what lit faces it sees
-_CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense,
-_LEAST = 6  # but at least so many each way, fewer on a face that is smaller than a cell,
-_ACROSS = 3  # and a cell across facets of a curved surface, from one to the next of which light changes little
+_CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
 _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; beyond it is like the nearest of them
@@ -49,29 +49,6 @@ _AT_ONCE = 200_000  # rays
 _TOGETHER = 64  # faces
 _LIFT = 1e-6  # of the object's size: between a place and its own face
 _MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
-_PLASTIC = 1.324717957244746  # x^3 = x + 1, whose powers fill a square evenly (Roberts 2018, "R2")
-
-
-@dataclass(frozen=True, eq=False)
-class Places:
-    """Places (m, 3) on faces (m,) of a solid, with their normals (m, 3)."""
-
-    points: np.ndarray
-    normals: np.ndarray
-    faces: np.ndarray
-
-    @classmethod
-    def spread(cls, solid: Solid, faces: np.ndarray, count: int) -> Places:
-        """So many, evenly over the area of some faces."""
-        here = np.isin(solid.triangle_faces, faces)
-        triangles, of_face = solid.triangles[here], solid.triangle_faces[here]
-        until = np.cumsum(_areas(triangles))
-        which = np.searchsorted(until, (np.arange(count) + 0.5) / count * until[-1])
-        a, b = _square(count).T
-        a, b = np.where(a + b > 1, 1 - a, a)[:, None], np.where(a + b > 1, 1 - b, b)[:, None]
-        first, second, third = triangles[which].swapaxes(0, 1)
-        points = first + a * (second - first) + b * (third - first)
-        return cls(points, solid.normals[of_face[which]], of_face[which])
 
 
 class Hits(NamedTuple):
@@ -138,7 +115,7 @@ class Exchange:
     def between(self) -> np.ndarray:
         """Form factors between patches, (p, p)."""
         rays, count = _ROUGH_RAYS if self.roughly else _RAYS, self.tree.n
-        met = self.met(self.places.points, self.places.normals, rays, _square(len(self.places.points)))
+        met = self.met(self.places.points, self.places.normals, rays, in_unit_square(len(self.places.points)))
         pairs = np.bincount(self.patches[met.starts] * count + met.patches, minlength=count * count)
         return pairs.reshape(count, count) / (rays * np.bincount(self.patches)[:, None])
 
@@ -155,12 +132,12 @@ class Exchange:
         parts = []
         for at in range(0, len(points), size):
             part = slice(at, at + size)
-            found = self._met(points[part], normals[part], (_square(rays) + shifts[part, None]) % 1.0)
+            found = self._met(points[part], normals[part], (in_unit_square(rays) + shifts[part, None]) % 1.0)
             parts.append(found._replace(starts=found.starts + at))
         return Hits(*map(np.concatenate, zip(*parts, strict=True)))
 
     def _met(self, points: np.ndarray, normals: np.ndarray, square: np.ndarray) -> Hits:
-        ways = _ways(normals, square)
+        ways = ways_about(normals, square)
         starts = np.broadcast_to((points + _LIFT * self.solid.extent * normals)[:, None], ways.shape)
         face, t = first_face(self.solid, starts, ways, (), margin=_MARGIN)
         if self.floor is not None:
@@ -180,15 +157,6 @@ class Exchange:
         place = starts[..., :2] + np.where(reached, until, 0.0)[..., None] * ways[..., :2]
         reached &= (np.abs(place) <= self.floor.half_side).all(-1)
         return np.where(reached, len(self.solid.faces) - 1, face), np.where(reached, until, t)
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A rectangle about a face, in its plane: a corner (3,), its unit sides (2, 3) and their lengths (2,)."""
-
-    corner: np.ndarray
-    sides: np.ndarray
-    size: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +206,7 @@ class Exchanged:
     def _by_patches(self) -> np.ndarray:
         """What arrives in the middles of all faces, (F,): a mean of what does at the patches about them."""
         solid, exchange = self.exchange.solid, self.exchange
-        middles = _middles(solid)
+        middles = middles_of(solid)
         away, near = exchange.tree.query(_placed(middles, solid.normals, exchange.cell), _ROUGH_PATCHES)
         weights = np.exp(-2 * (away**2 - away[:, :1] ** 2))
         return (weights * self.arriving[near]).sum(1) / weights.sum(1)
@@ -329,7 +297,7 @@ def exchange_of(
     solid, some = room(bodies, floor), np.setdiff1d(_seeing(bodies, floor), without)
     if len(some) < 2:
         return None
-    area = _areas(solid.triangles[np.isin(solid.triangle_faces, some)]).sum()
+    area = areas_of(solid.triangles[np.isin(solid.triangle_faces, some)]).sum()
     count = _PATCHES if floor is None else _PATCHES + _FLOOR_PATCHES
     places, cell = Places.spread(solid, some, count * _PLACES), float(np.sqrt(area / count))
     coordinates = _placed(places.points, places.normals, cell)
@@ -352,37 +320,6 @@ def _seeing(bodies: Solid, floor: Floor | None) -> np.ndarray:
 def _placed(points: np.ndarray, normals: np.ndarray, cell: float) -> np.ndarray:
     """Coordinates (n, 6) in which what is near belongs to one patch."""
     return np.concatenate([points / cell, _APART / np.sqrt(2) * normals], axis=-1)
-
-
-def _square(count: int) -> np.ndarray:
-    """So many points that fill the unit square evenly, (n, 2)."""
-    return _of_square(np.arange(1, count + 1)[:, None])
-
-
-def _of_square(number: int | np.ndarray) -> np.ndarray:
-    """Points of that sequence by their numbers, from 1, one more axis of 2."""
-    return number / _PLASTIC ** np.arange(1, 3) % 1.0
-
-
-def _ways(normals: np.ndarray, square: np.ndarray) -> np.ndarray:
-    """Unit vectors about normals (n, 3), as dense as the cosine to them, of points (n, k, 2) of the unit square."""
-    beside = np.eye(3)[np.abs(normals).argmin(-1)]
-    one = np.cross(normals, beside)
-    one /= np.linalg.norm(one, axis=-1, keepdims=True)
-    turn, out = 2 * np.pi * square[..., 0], np.sqrt(square[..., 1])
-    along = np.stack([out * np.cos(turn), out * np.sin(turn), np.sqrt(1 - square[..., 1])], -1)
-    return along @ np.stack([one, np.cross(normals, one), normals], -2)
-
-
-def _middles(solid: Solid) -> np.ndarray:
-    """Of faces, (F, 3)."""
-    areas, found = _areas(solid.triangles), np.zeros((len(solid.faces), 3))
-    np.add.at(found, solid.triangle_faces, areas[:, None] * solid.triangles.mean(1))
-    return found / np.bincount(solid.triangle_faces, areas, len(solid.faces))[:, None]
-
-
-def _areas(triangles: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1) / 2
 
 
 @kept(most=2048)
@@ -408,96 +345,17 @@ def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray
     Those on its rim stand a little within, for in an inner edge light comes from both sides.
     """
     solid, cell = exchange.solid, exchange.cell * np.sqrt(_PATCHES / _CELLS)
-    frame, facet = _frame(solid, face), not solid.plane[face]
-    u, v = (_along(*each, cell) for each in zip(frame.size, _goes_on(solid, face, frame), strict=True))
+    frame, facet = frame_of(solid, face), not solid.plane[face]
+    u, v = (along(*each, cell) for each in zip(frame.size, goes_on(solid, face, frame), strict=True))
     within = [_WITHIN * n[n > 0][0] for n in (u, v)]
     a, b = (np.clip(n, w, size - w) for n, w, size in zip((u, v), within, frame.size, strict=True))
     nodes = (frame.corner + a[:, None, None] * frame.sides[0] + b[:, None] * frame.sides[1]).reshape(-1, 3)
-    nodes = _onto(solid, face, nodes, min(within))
+    nodes = onto(solid, face, nodes, min(within))
     rays = _FROM_SMALL if not facet and (frame.size < cell).any() else _FROM_NODE
     rays = _ROUGH_NODE if exchange.roughly else rays
-    shift = _of_square(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
+    shift = of_sequence(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
     sheet = Sheet(frame, u, v, NOTHING_MET, rays)
     return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shift, (len(nodes), 2))
-
-
-def _along(size: float, goes_on: bool, cell: float) -> np.ndarray:
-    """Places of nodes along a side of a face's rectangle, denser at its ends; where the surface goes on beyond a side
-    that is shorter than a cell, the middles of equal pieces."""
-    if size < cell and goes_on:
-        count = int(np.ceil(_ACROSS * size / cell))
-        return (np.arange(count) + 0.5) * size / count
-    count = max(int(np.ceil(size / cell)), _LEAST) if size >= cell else int(np.ceil(_LEAST * size / cell))
-    return size * (1 - np.cos(np.pi * np.arange(count + 2) / (count + 1))) / 2
-
-
-def _goes_on(solid: Solid, face: int, frame: Frame) -> tuple[bool, bool]:
-    """Along which sides of a facet's rectangle its surface goes on: smooth edges run across them."""
-    ends = _smooth(solid).get(face, ())
-    across = np.abs((solid.vertices[[b for _, b in ends]] - solid.vertices[[a for a, _ in ends]]) @ frame.sides.T)
-    return bool((across[:, 1] > across[:, 0]).any()), bool((across[:, 0] > across[:, 1]).any())
-
-
-@lru_cache(maxsize=4)
-def _smooth(solid: Solid) -> dict[int, list[tuple[int, int]]]:
-    """Ends of the smooth edges of each facet of a curved surface."""
-    found: dict[int, list[tuple[int, int]]] = {}
-    for edge in solid.edges:
-        for face in edge.faces if edge.kind == "smooth" else ():
-            if not solid.plane[face]:
-                found.setdefault(face, []).append(edge.ends)
-    return found
-
-
-def _frame(solid: Solid, face: int) -> Frame:
-    corners, normal = solid.vertices[list(solid.faces[face])], solid.normals[face]
-    ways = np.roll(corners, -1, 0) - corners
-    one = max(ways, key=np.linalg.norm)
-    one = one / np.linalg.norm(one)
-    sides = np.stack([one, np.cross(normal, one)])
-    low, high = (end(corners @ sides.T, axis=0) for end in (np.min, np.max))
-    return Frame(normal * solid.offsets[face] + low @ sides, sides, high - low)
-
-
-def _onto(solid: Solid, face: int, points: np.ndarray, within: float) -> np.ndarray:
-    """Points of a face's plane, those outside of it brought to the nearest place a little within its rim."""
-    from scipy.spatial import KDTree  # slow to load, and rarely needed
-
-    away = ~_on(solid.triangles[solid.triangle_faces == face], points)
-    if not away.any():
-        return points
-    rim = _rim(solid, face, within)
-    found = points.copy()
-    found[away] = rim[KDTree(rim).query(points[away])[1]]
-    return found
-
-
-_ALONG_RIM = 400  # places
-
-
-def _rim(solid: Solid, face: int, within: float) -> np.ndarray:
-    """Places a little within a face's boundaries, those on the face, (n, 3)."""
-    loops = [solid.faces[face], *(solid.holes[face] if solid.holes else ())]
-    start = np.concatenate([solid.vertices[list(loop)] for loop in loops])
-    way = np.concatenate([solid.vertices[np.roll(loop, -1)] for loop in loops]) - start
-    length = np.linalg.norm(way, axis=1)
-    each = np.maximum(np.ceil(_ALONG_RIM * length / length.sum()).astype(int), 1)
-    side = np.repeat(np.arange(len(each)), each)
-    share = (np.arange(len(side)) - np.repeat(np.cumsum(each) - each, each) + 0.5) / each[side]
-    inwards = np.cross(solid.normals[face], way / length[:, None])
-    places = start[side] + share[:, None] * way[side] + within * inwards[side]
-    inside = _on(solid.triangles[solid.triangle_faces == face], places)
-    return places[inside] if inside.any() else solid.triangles[solid.triangle_faces == face].mean(1)
-
-
-def _on(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Which points (n, 3) of their plane lie on triangles (t, 3, 3)."""
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    inside = np.ones((len(points), len(triangles)), bool)
-    for k in range(3):
-        across = np.cross(normals, triangles[:, (k + 1) % 3] - triangles[:, k])
-        inside &= points @ across.T >= np.einsum("ti,ti->t", across, triangles[:, k])
-    return inside.any(1)
 
 
 @lru_cache(maxsize=8)
@@ -522,8 +380,8 @@ def once_reflected(
 
     Each sees others by other rays; facets ``own`` of the surface that the points lie on are none.
     """
-    bodies, shifts = scene.bodies, _square(len(points))
-    ways = _ways(normals, (_square(_REFLECTED) + shifts[:, None]) % 1.0)
+    bodies, shifts = scene.bodies, in_unit_square(len(points))
+    ways = ways_about(normals, (in_unit_square(_REFLECTED) + shifts[:, None]) % 1.0)
     starts = np.broadcast_to((points + _LIFT * bodies.extent * normals)[:, None], ways.shape)
     face, t = first_face(bodies, starts, ways, own)
     point, ray = np.nonzero(face >= 0)

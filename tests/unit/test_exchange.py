@@ -12,7 +12,9 @@ from imaging.light import exchange as exchange_module
 from imaging.light.between import _of_faces, _plain, light_between
 from imaging.light.bore import _form_factors
 from imaging.light.emitters import emitters
-from imaging.light.exchange import Hits, _arriving, _frame, _nodes, _onto, _rim, exchange_of, exchanged, room
+from imaging.light.exchange import Hits, _arriving, _nodes, exchange_of, exchanged, room
+from imaging.light.nodes import _rim, frame_of, onto
+from imaging.light.places import Places
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
 from scenes.parts.mesh import solid as mesh_solid
@@ -217,7 +219,7 @@ def test_light_that_is_told_roughly_is_near(part, tmp_path):
     pictures = Pictures.of(scene, (40, 20), (30, 100))
     shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     exact, rough = (_of_faces(scene, shining, roughly) for roughly in (False, True))
-    places = exchange_module.Places.spread(exact.exchange.solid, exact.exchange.faces, 500)
+    places = Places.spread(exact.exchange.solid, exact.exchange.faces, 500)
     there, found = (each.at(places.points, places.faces) for each in (exact, rough))
     assert rough.exchange.small[places.faces].any() == (part == "cup")
     assert not exact.exchange.small.any()
@@ -305,7 +307,7 @@ def test_nodes_that_are_not_on_a_face_are_brought_to_its_nearest_rim(pierced):
     outline = solid.vertices[list(solid.faces[face])]
     beyond = outline[0] + 0.3 * (outline[0] - outline.mean(0)) / np.linalg.norm(outline[0] - outline.mean(0))
     on = hole.mean(0) + 1.2 * (hole[0] - hole.mean(0))
-    moved = _onto(solid, face, np.stack([hole.mean(0), beyond, on]), 0.01)
+    moved = onto(solid, face, np.stack([hole.mean(0), beyond, on]), 0.01)
     radius = np.linalg.norm(hole[0] - hole.mean(0))
     assert np.linalg.norm(moved[0] - hole.mean(0)) == pytest.approx(radius + 0.01, rel=0.01)
     assert np.linalg.norm(moved[1] - outline[0]) < 0.3  # margin: places along the rim are 0.1 apart
@@ -314,7 +316,7 @@ def test_nodes_that_are_not_on_a_face_are_brought_to_its_nearest_rim(pierced):
 
 def test_a_rectangle_about_a_face_touches_it_on_all_sides(pierced):
     for solid, face in (pierced, (scenes.load("wedge").solid, 0), (scenes.load("bracket").solid, 1)):
-        frame, corners = _frame(solid, face), solid.vertices[list(solid.faces[face])]
+        frame, corners = frame_of(solid, face), solid.vertices[list(solid.faces[face])]
         placed = (corners - frame.corner) @ frame.sides.T
         assert placed.min(0) == pytest.approx(0, abs=1e-9)
         assert placed.max(0) == pytest.approx(frame.size)

@@ -1,0 +1,69 @@
+"""Places spread evenly over faces, and directions from them, without random numbers.
+
+A low-discrepancy sequence fills the unit square; its points are folded into triangles, or stand for directions as
+dense as Lambert's cosine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenes import Solid
+
+_PLASTIC = 1.324717957244746  # x^3 = x + 1, whose powers fill a square evenly (Roberts 2018, "R2")
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places (m, 3) on faces (m,) of a solid, with their normals (m, 3)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+
+    @classmethod
+    def spread(cls, solid: Solid, faces: np.ndarray, count: int) -> Places:
+        """So many, evenly over the area of some faces."""
+        here = np.isin(solid.triangle_faces, faces)
+        triangles, of_face = solid.triangles[here], solid.triangle_faces[here]
+        until = np.cumsum(areas_of(triangles))
+        which = np.searchsorted(until, (np.arange(count) + 0.5) / count * until[-1])
+        a, b = in_unit_square(count).T
+        a, b = np.where(a + b > 1, 1 - a, a)[:, None], np.where(a + b > 1, 1 - b, b)[:, None]
+        first, second, third = triangles[which].swapaxes(0, 1)
+        points = first + a * (second - first) + b * (third - first)
+        return cls(points, solid.normals[of_face[which]], of_face[which])
+
+
+def in_unit_square(count: int) -> np.ndarray:
+    """So many points that fill the unit square evenly, (n, 2)."""
+    return of_sequence(np.arange(1, count + 1)[:, None])
+
+
+def of_sequence(number: int | np.ndarray) -> np.ndarray:
+    """Points of that sequence by their numbers, from 1, one more axis of 2."""
+    return number / _PLASTIC ** np.arange(1, 3) % 1.0
+
+
+def ways_about(normals: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """Unit vectors about normals (n, 3), as dense as the cosine to them, of points (n, k, 2) of the unit square."""
+    beside = np.eye(3)[np.abs(normals).argmin(-1)]
+    one = np.cross(normals, beside)
+    one /= np.linalg.norm(one, axis=-1, keepdims=True)
+    turn, out = 2 * np.pi * square[..., 0], np.sqrt(square[..., 1])
+    along = np.stack([out * np.cos(turn), out * np.sin(turn), np.sqrt(1 - square[..., 1])], -1)
+    return along @ np.stack([one, np.cross(normals, one), normals], -2)
+
+
+def middles_of(solid: Solid) -> np.ndarray:
+    """Of faces, (F, 3)."""
+    areas, found = areas_of(solid.triangles), np.zeros((len(solid.faces), 3))
+    np.add.at(found, solid.triangle_faces, areas[:, None] * solid.triangles.mean(1))
+    return found / np.bincount(solid.triangle_faces, areas, len(solid.faces))[:, None]
+
+
+def areas_of(triangles: np.ndarray) -> np.ndarray:
+    """Of triangles (t, 3, 3), (t,)."""
+    return np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=-1) / 2
