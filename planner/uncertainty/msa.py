@@ -8,7 +8,8 @@ are chi-square over degrees of freedom, independent of each other; so each compo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from scipy import optimize, special
@@ -19,6 +20,13 @@ from scenes import InvalidInput
 
 NDC = 1.41  # distinct categories: so many times parts' spread over that of the measurement (AIAG)
 COMPONENTS = ("repeats", "operators x parts", "operators", "parts")
+_FIELDS = ("repeats", "both", "operators", "parts")  # of `Components`, in that order
+CUSTOMARY = (3, 10, 3)  # operators, parts, repeats of AIAG's study
+LEVEL = 0.01  # that any component of a study as predicted is called too large
+_MOST = (40, 60, 5)  # operators, parts, repeats of a study that can be made
+
+
+Count: TypeAlias = "int | np.ndarray"
 
 
 @dataclass(frozen=True)
@@ -70,12 +78,19 @@ class Components:
         """Number of distinct categories, at least 1 (AIAG); None where parts' spread is not known, or GRR is 0."""
         return max(int(NDC * self.parts / self.grr), 1) if self.parts is not None and self.grr > 0 else None
 
-    def mean_squares(self, operators: int, parts: int, repeats: int) -> np.ndarray:
-        """Expectations of a study's mean squares, in the order of `COMPONENTS`, (4,); NaN of parts not known."""
+    def mean_squares(self, operators: Count, parts: Count, repeats: Count) -> np.ndarray:
+        """Expectations of a study's mean squares, in the order of `COMPONENTS`, (4, ...); NaN of parts not known."""
         one = self.repeats**2
         both = one + repeats * self.both**2
         spread = np.nan if self.parts is None else self.parts
-        return np.array([one, both, both + parts * repeats * self.operators**2, both + operators * repeats * spread**2])
+        rows = one, both, both + parts * repeats * self.operators**2, both + operators * repeats * spread**2
+        return np.array(np.broadcast_arrays(*rows))
+
+
+def degrees_of_freedom(operators: Count, parts: Count, repeats: Count) -> np.ndarray:
+    """Of a study's mean squares, in the order of `COMPONENTS`, (4, ...)."""
+    o, p, r = np.broadcast_arrays(operators, parts, repeats)
+    return np.array([o * p * (r - 1), (o - 1) * (p - 1), o - 1, p - 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +110,7 @@ class Study:
     @property
     def dof(self) -> np.ndarray:
         """Degrees of freedom of the mean squares, in the order of `COMPONENTS`, (4,)."""
-        o, p, r = self.values.shape
-        return np.array([o * p * (r - 1), (o - 1) * (p - 1), o - 1, p - 1])
+        return degrees_of_freedom(*self.values.shape)
 
     @property
     def mean_squares(self) -> np.ndarray:
@@ -174,10 +188,68 @@ def check(study: Study, predicted: Components) -> tuple[Checked, ...]:
     return tuple(rows)
 
 
-def too_large(rows: tuple[Checked, ...], level: float = 0.01) -> tuple[str, ...]:
+def too_large(rows: tuple[Checked, ...], level: float = LEVEL) -> tuple[str, ...]:
     """Names of components that are larger than predicted beyond chance; ``level``: that any is called so wrongly."""
-    least = 1 - (1 - level) ** (1 / max(len(rows), 1))
-    return tuple(row.name for row in rows if row.p < least)
+    return tuple(row.name for row in rows if row.p < _of_one(level, len(rows)))
+
+
+def _of_one(level: float, tests: int) -> float:
+    """The level of each of some independent tests that have this one together (Sidak)."""
+    return 1 - (1 - level) ** (1 / max(tests, 1))
+
+
+def found_by(
+    predicted: Components, operators: Count, parts: Count, repeats: Count, times: float = 2.0
+) -> dict[str, np.ndarray]:
+    """How likely a study names a component (`too_large`) that is larger than predicted, by component, each (...).
+
+    Parameters
+    ----------
+    predicted : Components
+        Those that are 0 or not known are left out.
+    operators, parts, repeats : int or ndarray
+        Of the study, at least 2 each; arrays broadcast.
+    times : float
+        So many times the predicted standard deviation, each component alone.
+
+    Examples
+    --------
+    >>> told = Components(1.0, 0.5, 0.8, 4.0)
+    >>> {name: round(float(p), 2) for name, p in found_by(told, 3, 10, 3).items()}
+    {'repeats': 1.0, 'operators x parts': 0.32, 'operators': 0.13, 'parts': 0.36}
+    """
+    dof, expected = degrees_of_freedom(operators, parts, repeats), predicted.mean_squares(operators, parts, repeats)
+    least, found = _of_one(LEVEL, 3 if predicted.parts is None else 4), {}
+    for k, (name, key, below) in enumerate(zip(COMPONENTS, _FIELDS, (None, 0, 1, 1), strict=True)):
+        own = getattr(predicted, key)
+        if not own:
+            continue
+        larger = replace(predicted, **{key: times * own}).mean_squares(operators, parts, repeats)[k] / expected[k]
+        if below is None:
+            found[name] = special.chdtrc(dof[k], special.chdtri(dof[k], least) / larger)
+        else:
+            critical = special.fdtri(dof[k], dof[below], 1 - least)
+            found[name] = special.fdtrc(dof[k], dof[below], critical / larger)
+    return found
+
+
+def smallest_study(predicted: Components, sure: float = 0.9, times: float = 2.0) -> tuple[int, int, int] | None:
+    """Operators, parts and repeats of the study of fewest values that names each component which is so many times
+    as large as predicted at least this likely (`found_by`); None where 40 operators, 60 parts and 5 repeats do not.
+
+    Examples
+    --------
+    >>> smallest_study(Components(1.0, 0.5, 0.8, 4.0))
+    (19, 18, 2)
+    """
+    o, p, r = np.ogrid[2 : _MOST[0] + 1, 2 : _MOST[1] + 1, 2 : _MOST[2] + 1]
+    likely = found_by(predicted, o, p, r, times)
+    good = np.min(list(likely.values()), axis=0) >= sure if likely else np.ones((1, 1, 1), bool)
+    values = np.where(good, o * p * r, np.inf)
+    if not np.isfinite(values).any():
+        return None
+    at = np.unravel_index(np.argmin(values), values.shape)
+    return int(at[0]) + 2, int(at[1]) + 2, int(at[2]) + 2
 
 
 @dataclass(frozen=True)

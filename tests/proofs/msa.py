@@ -2,7 +2,8 @@
 
 Studies are drawn whose components are known. Of each component the stated 95 % interval has to hold the true ratio in
 95 % of the studies, a study as predicted may be called otherwise in 1 % of them, and a component that is twice as large
-as predicted has to be named. Guard bands: parts and measurements are drawn, and the cost of wrong decisions counted.
+as predicted has to be named as often as is told, by the smallest study that is told to name each, too. Guard bands:
+parts and measurements are drawn, and the cost of wrong decisions counted.
 """
 
 from __future__ import annotations
@@ -15,7 +16,16 @@ import numpy as np
 import typer
 from scipy import stats
 
-from planner.uncertainty.msa import COMPONENTS, Components, Study, cheapest_guard, check, too_large
+from planner.uncertainty.msa import (
+    COMPONENTS,
+    Components,
+    Study,
+    cheapest_guard,
+    check,
+    found_by,
+    smallest_study,
+    too_large,
+)
 from planner.uncertainty.risks import Limits
 
 TOLD = Components(1.0, 0.5, 0.8, 4.0)
@@ -83,12 +93,20 @@ def msa(
     """Analysis of variance over simulated studies, and guard bands of least cost against drawn parts, 10 seconds."""
     shape = (operators, parts, repeats)
     told, named = calibrated(studies, seed, shape), found(studies, seed, shape)
+    small = smallest_study(TOLD)
+    assert small is not None
+    smallest = found(studies, seed + 1, small)
     guards = [guard(draws, seed, *each) for each in GUARDS]
     ratios = {name: stats.binomtest(round(told[name] * studies), studies, 0.95).pvalue for name in COMPONENTS}
     right = all(p > _SURE for p in ratios.values())
     right &= stats.binomtest(round(told["called"] * studies), studies, 0.01, alternative="greater").pvalue > _SURE
     right &= all(abs(each["told"] - each["drawn"]) < 4 * each["error"] and each["more"] > 3 for each in guards)
+    for rates, size in ((named, shape), (smallest, small)):
+        for name, p in found_by(TOLD, *size).items():
+            right &= stats.binomtest(round(rates[name] * studies), studies, float(p)).pvalue > _SURE
+    right &= min(smallest.values()) > 0.9 - 4 * (0.09 / studies) ** 0.5
     print(json.dumps({"study": shape, "predicted": asdict(TOLD), "held": told, "doubled, named": named,
+                      "smallest": small, "doubled, named by it": smallest,
                       "guards": guards}, indent=1))  # fmt: skip
     raise typer.Exit(0 if right else 1)
 

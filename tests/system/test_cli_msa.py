@@ -28,6 +28,23 @@ def test_a_study_is_compared_component_by_component(tmp_path):
         assert ("larger than predicted: repeats" in printed.stdout) == bool(wrong)
 
 
+def test_what_a_study_can_find_is_told_of_its_size():
+    """Two parts tell little of repeats; the smallest study that does is told."""
+    likely = {}
+    for size in ("2,2,2", "3,10,3"):
+        (row,) = json.loads(ice(*ASKED, "--size", size).stdout)["measurands"]
+        told = row["found_if_doubled"]
+        assert ",".join(str(told[key]) for key in ("operators", "parts", "repeats")) == size
+        likely[size] = told["components"]["repeats"]
+    assert likely["2,2,2"] < 0.7  # margin: 0.46
+    assert likely["3,10,3"] > 0.99  # margin: 1.0
+    assert set(row["smallest_study"]) == {"operators", "parts", "repeats"}
+    refused = ice("msa", "calibrated_rig", "--size", "3,1,3")
+    assert (refused.returncode, refused.stderr) == (
+        2, "--size must be of 2 to 1000 operators, parts and repeats, got '3,1,3'\n",
+    )  # fmt: skip
+
+
 def test_costs_come_together():
     refused = ice("msa", "calibrated_rig", "--cost-accepted", "10")
     assert (refused.returncode, refused.stderr) == (

@@ -5,9 +5,18 @@ import pytest
 
 import scenes
 from planner.budgeting.budgets import budget
-from planner.uncertainty.msa import COMPONENTS, Components, Study, cheapest_guard, check, too_large
+from planner.uncertainty.msa import (
+    COMPONENTS,
+    Components,
+    Study,
+    cheapest_guard,
+    check,
+    found_by,
+    smallest_study,
+    too_large,
+)
 from planner.uncertainty.risks import Limits, global_risks
-from tests.proofs.msa import GUARDS, guard
+from tests.proofs.msa import GUARDS, found, guard
 from validation import msa
 
 # The example of the AIAG manual (Measurement Systems Analysis, 4th edition): three appraisers, ten parts, three trials.
@@ -75,6 +84,26 @@ def test_a_component_that_is_much_too_large_is_named_and_no_other(name):
     named = [too_large(check(drawn(rng, wrong), TOLD)) for _ in range(50)]
     assert np.mean([name in each for each in named]) > 0.75  # margin: all but operators above 0.95
     assert np.mean([bool(set(each) - {name}) for each in named]) < 0.15  # margin: 0.01 by chance
+
+
+@pytest.mark.parametrize("shape", [(3, 10, 3), (8, 6, 2)])
+def test_how_likely_a_study_finds_what_is_twice_as_large_is_how_often_it_does(shape):
+    """400 drawn studies each; a component that is as predicted is named in 1 % of them and not that often."""
+    told = found_by(TOLD, *shape)
+    for name, rate in found(400, 5, shape).items():
+        assert abs(rate - told[name]) < 4 * np.sqrt(told[name] * (1 - told[name]) / 400) + 1e-3
+    for name, rate in found(400, 6, shape, times=1.0).items():
+        assert rate < 0.0025 + 4 * np.sqrt(0.0025 / 400), name
+        assert found_by(TOLD, *shape, times=1.0)[name] == pytest.approx(1 - 0.99**0.25, rel=1e-9)
+
+
+def test_the_smallest_study_finds_each_and_no_smaller_one_does():
+    o, p, r = smallest_study(TOLD)
+    assert min(found_by(TOLD, o, p, r).values()) >= 0.9
+    for size in np.ndindex(o + 6, p + 6, r + 2):
+        if min(size) >= 2 and np.prod(size) < o * p * r:
+            assert min(found_by(TOLD, *size).values()) < 0.9
+    assert smallest_study(Components(1.0, 0.0, 0.001, 4.0)) is None  # operators are lost beside repeats
 
 
 def test_what_is_derived_of_components():

@@ -8,7 +8,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.uncertainty.msa import COMPONENTS, Checked, Guard, Study, too_large
+from planner.uncertainty.msa import COMPONENTS, Checked, Guard, Study, found_by, smallest_study, too_large
 from scenes.status import is_trusted, legend
 from validation.msa import Predicted
 from validation.report import cells
@@ -27,12 +27,14 @@ _OF_STUDY = (
 
 def report(
     told: Sequence[Predicted],
+    sizes: Mapping[str, tuple[int, int, int]],
     made: Mapping[str, Study],
     checks: Mapping[str, Sequence[Checked]],
     guards: Mapping[str, Guard | None],
 ) -> Group:
     """The prediction of each measurand, what a study says of it, and guard bands."""
     parts = [_predicted(told), Text(_TERMS), *(Text(f" {line}") for line in legend([each.status for each in told]))]
+    parts += [Text("\n" + "\n".join(f" {power(each, sizes[each.name])}" for each in told))]
     for each in told:
         if each.name in made:
             parts += [_study(each, made[each.name], checks[each.name]), Text(f" {sentence(each, checks[each.name])}")]
@@ -51,6 +53,20 @@ def sentence(each: Predicted, rows: Sequence[Checked]) -> str:
     return f"{each.name}: no component is larger than predicted beyond chance."
 
 
+def power(each: Predicted, size: tuple[int, int, int]) -> str:
+    """How likely a study of some size finds what is twice as large as predicted, and the smallest that finds it all."""
+    likely, least = found_by(each.components, *size), smallest_study(each.components)
+    if not likely:
+        return f"{each.name}: nothing is predicted that a study could find."
+    rates = ", ".join(f"{name} {cells.percent(float(p))}" for name, p in likely.items())
+    needed = "no study of up to 40 operators, 60 parts, 5 repeats names" if least is None else f"{_sized(least)} name"
+    return f"{each.name}: {_sized(size)} name a component twice as large with: {rates}; {needed} each with 90 %."
+
+
+def _sized(size: tuple[int, ...]) -> str:
+    return "{} operators, {} parts, {} repeats".format(*size)
+
+
 def _predicted(told: Sequence[Predicted]) -> Table:
     columns = ("measurand", "unit", "EV", "AV", "GRR", "constant", "% of T", "% of TV", "ndc", "Cg", "Cgk", "status")
     table = cells.table("Predicted measurement system", *columns, words=("measurand", "unit", "status"))
@@ -66,8 +82,7 @@ def _predicted(told: Sequence[Predicted]) -> Table:
 
 
 def _study(each: Predicted, study: Study, rows: Sequence[Checked]) -> Table:
-    o, p, r = study.values.shape
-    title = f"\n{each.name} [{each.unit}]: a study of {o} operators, {p} parts, {r} repeats"
+    title = f"\n{each.name} [{each.unit}]: a study of {_sized(study.values.shape)}"
     table = cells.table(title, "component", "study", "predicted", "study / predicted", "p", words=("component",))
     seen, wanted = (
         dict(zip(COMPONENTS, (kept.repeats, kept.both, kept.operators, kept.parts), strict=True))
