@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import scenes
 from planner.budgeting.budgets import SceneBudget
 from planner.designing.alternatives import alternatives
-from planner.designing.search import Design, Offer
+from planner.designing.outcome import Design, Offer
 from planner.designing.stations import station
 from scenes import InvalidInput, Picture, Scene
 from scenes.files.door import read_toml

@@ -11,25 +11,16 @@ import pytest
 
 import scenes
 from imaging.geometry.projection import project
-from planner.designing import alternatives
+from planner.designing import ahead, alternatives, search
 from planner.designing.bounds import NOISE, REASONS, pairs
-from planner.designing.close import look
+from planner.designing.close import Close, look
 from planner.designing.dominance import of_light, of_sensor, undominated
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, limit_ratio, rate, rate_light, views
 from planner.designing.optics import ROLLING, TIME, Focused, blur_um, chosen, focused
-from planner.designing.search import (
-    COLOUR,
-    CONTRADICTORY,
-    INCOMPLETE,
-    LARGE,
-    PRICELESS,
-    Design,
-    Offer,
-    Tally,
-    design,
-    usable,
-)  # fmt: skip
+from planner.designing.outcome import Design, Offer, Tally
+from planner.designing.search import design
 from planner.designing.stations import carried, station
+from planner.designing.usable import COLOUR, CONTRADICTORY, INCOMPLETE, LARGE, PRICELESS, usable
 from planner.designing.wishes import Wishes, allowed
 from planner.uncertainty.risks import Limits, global_risks
 from scenes import InvalidInput, Jitter, Uncertainty, catalogue
@@ -279,3 +270,28 @@ def test_what_cannot_be_signed_is_tried_from_elsewhere_first(monkeypatch: pytest
     assert proofs(signed=True) == [own]
     there, other = proofs(signed=False)
     assert there == own != other
+
+
+def test_a_pair_whose_close_look_fails_is_tried_with_its_next_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Close looks are stood in for: only the dearer lens under the second light meets all when it is looked at so.
+
+    Its first light passes at a glance, and is known to show the edges by the cheaper lens, so that only the last look
+    contradicts it.
+    """
+    told = {("narrow", "a"): 2.0, ("narrow", "b"): 2.0, ("wide", "a"): 2.0, ("wide", "b"): 0.5}
+
+    def stood_in(_: Problem, rated: Rated) -> Close:
+        return Close((), ("ok",), told[rated.names[1:]], 0, 0.5)
+
+    for module in (search, ahead):
+        monkeypatch.setattr(module, "look", stood_in)
+    given = synthetic(11, 1, 40, 1)
+    glass = next(each for each in given.lenses if each.focal_length_mm == 25.0)
+    lenses = [glass.model_copy(update={"name": name, "price": price, "format": None, "image_circle_mm": circle})
+              for name, price, circle in (("narrow", 50.0, 30.0), ("wide", 60.0, 40.0))]  # fmt: skip
+    lamps = [ListedLight(name=name, price=price, kind="spot", outer_diameter_mm=wide, radiance=200.0)
+             for name, price, wide in (("a", 10.0, 20.0), ("b", 20.0, 21.0))]  # fmt: skip
+    parts = given.model_copy(update={"lenses": tuple(lenses), "lights": tuple(lamps)})
+    found = design(_problem(2.0), parts)
+    assert found.reached
+    assert found.best.rated.names[1:] == ("wide", "b")

@@ -21,7 +21,7 @@ from validation.report.terminal import console
 from validation.strict_json import plain
 
 if TYPE_CHECKING:
-    from planner.designing.search import Design, Offer
+    from planner.designing.outcome import Design, Offer
     from planner.designing.wishes import Wishes
     from validation.designed import StationProof
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Group
 from rich.text import Text
 
-from planner.designing.search import Design, Offer
+from planner.designing.outcome import Design, Offer
 from scenes.status import is_trusted
 from validation.designed import StationProof
 from validation.report import design_words
