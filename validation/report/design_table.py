@@ -72,7 +72,8 @@ def _ratio(found: Design, offer: Offer) -> str:
 def _proof(proof: StationProof) -> list[str]:
     states = "all values may be signed" if proof.trusted else f"statuses {', '.join(proof.budget.statuses)}"
     names = " + ".join(proof.offer.rated.names)
-    lines = [f"{names}, rendered: worst U over what is allowed {proof.ratio:.3f}, biases taken off; {states}."]
+    told = f"{proof.ratio:.3f} (told {proof.offer.ratio:.3f})"
+    lines = [f"{names}, rendered: worst U over what is allowed {told}, biases taken off; {states}."]
     if proof.run is not None:
         lines.append(f"Noisy pictures: {proof.run.verdict.text}")
     return lines
