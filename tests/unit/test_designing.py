@@ -295,3 +295,41 @@ def test_a_pair_whose_close_look_fails_is_tried_with_its_next_light(monkeypatch:
     found = design(_problem(2.0), parts)
     assert found.reached
     assert found.best.rated.names[1:] == ("wide", "b")
+
+
+def _offers(*ratios: float) -> list[Offer]:
+    """By rising cost, with ratios that a search tells."""
+    return [Offer(float(k), SimpleNamespace(ratio=ratio)) for k, ratio in enumerate(ratios)]
+
+
+def test_as_many_of_the_front_are_rendered_as_are_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best first, then what is dearer and meets all, then what is cheaper, the dearest of it first."""
+    offers = _offers(2.0, 1.2, 0.9, 0.8)
+    given = Design(_problem(), offers[2], True, tuple(offers), Tally(1, 1, 1, {}, 1, {}, 1, 1, 1, True), False)
+
+    def tried(wanted: int, *wrong: int) -> tuple[list[float], float]:
+        def stood_in(_: Design, each: Offer, *more: object) -> SimpleNamespace:
+            return SimpleNamespace(offer=each, trusted=True, holds=each not in [offers[k] for k in wrong])
+
+        monkeypatch.setattr(designed, "prove", stood_in)
+        found, proofs = designed.proven(given, 0, wanted=wanted)
+        return [each.offer.cost for each in proofs], found.best.cost
+
+    assert tried(1) == ([2.0], 2.0)
+    assert tried(1, 2) == ([2.0, 3.0], 3.0)
+    assert tried(1, 2, 3) == ([2.0, 3.0], 2.0)
+    assert tried(3) == ([2.0, 3.0, 1.0], 2.0)
+    assert tried(3, 2) == ([2.0, 3.0, 1.0, 0.0], 3.0)
+
+
+@pytest.mark.parametrize(
+    ("told", "rendered", "signed", "agrees", "holds"),
+    [(0.9, 0.99, True, True, True), (0.9, 1.01, True, True, False), (1.2, 1.25, True, True, True),
+     (1.2, 1.3, True, True, False), (0.9, 0.9, False, True, False), (0.9, 0.9, True, False, False)],
+)  # fmt: skip
+def test_a_proof_holds_where_all_is_as_told(
+    told: float, rendered: float, signed: bool, agrees: bool, holds: bool
+) -> None:
+    budget = SimpleNamespace(statuses=("ok", "ok" if signed else "clutter"))
+    run = SimpleNamespace(verdict=SimpleNamespace(agrees=agrees))
+    assert designed.StationProof(_offers(told)[0], budget, rendered, run).holds is holds
