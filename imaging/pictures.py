@@ -11,12 +11,13 @@ import numpy as np
 
 from imaging.geometry.projection import light_position, sensor_position, viewpoint
 from imaging.light.emitters import Emitter, emitters
-from scenes import InvalidInput, Picture, Scene, mounted
+from scenes import InvalidInput, Noise, Picture, Scene, mounted
 from scenes.arrays import poses
 from scenes.lights import FULL, GLANCE
 from scenes.viewpoint import Viewpoint
 
 T = TypeVar("T")
+_OF_LIGHT = ("sensor_at", "viewpoint", "lights_at", "emitters", "edges", "measurands", "sides")  # whatever the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,12 @@ class Pictures:
     def with_scene(self, scene: Scene) -> Pictures:
         """The same poses in another scene."""
         return Pictures(scene, self.sensors, self.lights, self.closely, self.roughly)
+
+    def with_noise(self, noise: Noise) -> Pictures:
+        """The same pictures by a sensor of another noise; what geometry and light alone decide is kept."""
+        named = {key: key if isinstance(key, str) else key[0] for key in self._known}
+        kept = {key: self._known[key] for key, name in named.items() if name in _OF_LIGHT}
+        return replace(self, scene=self.scene.model_copy(update={"noise": noise}), _known=kept)
 
     def at(self, sensors: np.ndarray, lights: tuple[np.ndarray, ...]) -> Pictures:
         """The same scene from other poses, looked at as closely."""

@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
 from scenes.cameras import CAMERAS, LENSES, AnyCamera
+from scenes.cameras.binning import binned
 from scenes.cameras.colour import Colour
 from scenes.cameras.data_sheet import completed
 from scenes.cameras.noise import Noise
@@ -364,6 +365,12 @@ class Scene(Model):
         if not isinstance(camera, dict) or unit not in UNITS:
             return data
         return {**data, "camera": completed(camera, unit)}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_squares_of_pixels(cls, data: Any) -> Any:
+        """What binning makes of a sensor's pixels."""
+        return binned(data) if isinstance(data, dict) else data
 
     @model_validator(mode="before")
     @classmethod

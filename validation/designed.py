@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import scenes
 from planner.budgeting.budgets import SceneBudget
 from planner.designing.alternatives import alternatives
-from planner.designing.search import Design, Offer
+from planner.designing.outcome import Design, Offer
 from planner.designing.stations import station
 from scenes import InvalidInput, Picture, Scene
 from scenes.files.door import read_toml
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from validation.batch.result import Validation
 
 _TRIED, _OTHERS = 3, 2  # pairs of camera and lens that are rendered, and other places and lights for each
+_AS_TOLD = 1.05  # of U, where a station is said not to meet what is allowed: what its bias leaves open comes on top
 _DERIVED = ("distance", "focal_px")  # of a camera's data sheet
 
 
@@ -54,8 +55,12 @@ class StationProof:
 
     @property
     def holds(self) -> bool:
-        """Whether every value may be signed, with the U that is allowed, and noise is as predicted."""
-        return self.trusted and self.ratio <= 1 and (self.run is None or bool(self.run.verdict.agrees))
+        """Whether every value may be signed, with the U that is allowed, and noise and means are as predicted.
+
+        Of a station that is said not to meet what is allowed: with the U that is told.
+        """
+        most = 1.0 if self.offer.ratio <= 1 else _AS_TOLD * self.offer.ratio
+        return self.trusted and self.ratio <= most and (self.run is None or bool(self.run.verdict.agrees))
 
 
 def posed(design: Design, offer: Offer) -> Scene:
@@ -82,30 +87,47 @@ def prove(design: Design, offer: Offer, renders: int, report: Any = None) -> Sta
     return StationProof(offer, found, float(ratio), made)
 
 
-def proven(design: Design, renders: int, report: Any = None) -> tuple[Design, tuple[StationProof, ...]]:
-    """The design with the first station that rendering bears out.
+def proven(
+    design: Design, renders: int, report: Any = None, wanted: int = 1
+) -> tuple[Design, tuple[StationProof, ...]]:
+    """The design with the first station that rendering bears out, and the proofs of as many as are wanted.
 
-    The best, then the next of the front that meet all. Where values of one cannot be signed, what lies beside their
-    edges depends on light and place more than is known: other places and lights for its camera and lens come first.
-    Without any the design stays as it is, and its proofs say so.
+    The best, then the next of the front that meet all; where more than one is wanted and these are too few, those
+    before them, the dearest first. Without any that meets all the design stays as it is, and its proofs say so.
     """
     proofs: list[StationProof] = []
-    for offer in _members(design)[:_TRIED]:
-        proofs.append(prove(design, offer, renders, report))
-        others = iter(()) if proofs[-1].trusted else islice(alternatives(design, offer), _OTHERS)
-        while not proofs[-1].holds and (other := next(others, None)) is not None:
-            proofs.append(prove(design, other, renders, report))
-        if proofs[-1].holds:
-            return replace(design, best=proofs[-1].offer), tuple(proofs)
-    return design, tuple(proofs)
+    held: list[Offer] = []
+    for offer in _members(design, wanted)[: _TRIED + wanted - 1]:
+        proofs += _tried(design, offer, renders, report)
+        held += [proofs[-1].offer] if proofs[-1].holds else []
+        if len(held) == wanted:
+            break
+    best = next((each for each in held if each.ratio <= 1), design.best)
+    return replace(design, best=best), tuple(proofs)
 
 
-def _members(design: Design) -> list[Offer]:
-    """The best, and the next of the front that meet all, by cost."""
+def _tried(design: Design, offer: Offer, renders: int, report: Any) -> list[StationProof]:
+    """Proofs of one camera and lens, the last of which holds if any does.
+
+    Where values cannot be signed, what lies beside their edges depends on light and place more than is known: other
+    places and lights come then.
+    """
+    proofs = [prove(design, offer, renders, report)]
+    others = iter(()) if proofs[0].trusted else islice(alternatives(design, offer), _OTHERS)
+    while not proofs[-1].holds and (other := next(others, None)) is not None:
+        proofs.append(prove(design, other, renders, report))
+    return proofs
+
+
+def _members(design: Design, wanted: int) -> list[Offer]:
+    """The best, and the next of the front that meet all, by cost; where several are wanted then the others, the dearest
+    first."""
     if design.best is None:
         return []
-    dearer = [each for each in design.front if each.cost >= design.best.cost and each.ratio <= 1]
-    return [design.best, *(each for each in dearer if each.rated is not design.best.rated)]
+    others = [each for each in design.front if each.rated is not design.best.rated]
+    dearer = [each for each in others if each.cost >= design.best.cost and each.ratio <= 1]
+    more = [each for each in reversed(others) if each not in dearer] if wanted > 1 else []
+    return [design.best, *dearer, *more]
 
 
 def write(design: Design, source: str, path: Path) -> Scene:

@@ -9,6 +9,7 @@ import scenes
 from measure.fitting.parameters import size_of
 from measure.fitting.result import Fit
 from scenes import Lens
+from scenes.cameras.binning import binned
 from scenes.files.door import read_toml
 from scenes.numbers import number_at
 from scenes.scene import Scene
@@ -30,7 +31,7 @@ def write(found: Fit, source: str, path: Path) -> Scene:
         If the file cannot be written, or what was fitted makes no scene: a sensor within the part, say.
     """
     origin = scenes.find(source)
-    document = taken_out(read_toml(origin))  # what numbers were uncertain by, the photographs have told
+    document = binned(taken_out(read_toml(origin)))  # what numbers were uncertain by, the photographs have told
     document.pop("uncertain", None)
     document = _document(found, document)
     head = f"# {origin.name} as photographs show it: camera, noise and settings were fitted (status {found.status}).\n"

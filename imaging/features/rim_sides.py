@@ -279,8 +279,9 @@ def _sides(pictures: Pictures, circle: Circle, points, radial, fall_off) -> np.n
     levels = []
     for turned, level in sides:
         wanted = seen & ~turned
-        past = behind(pictures, probe, wanted, (circle.face,), fall_off=fall_off)
-        levels.append(np.where(seen, np.where(wanted, past, level), 0.0))
+        if wanted.any():
+            level = np.where(wanted, behind(pictures, probe, wanted, (circle.face,), fall_off=fall_off), level)
+        levels.append(np.where(seen, level, 0.0))
     return np.stack(np.broadcast_arrays(*levels), -2)
 
 

@@ -50,6 +50,8 @@ class Features:
     @cached_property
     def gradient_object(self) -> np.ndarray:
         """Derivatives (M, q) of the values in the object by those errors, the part's place adjusted."""
+        if self.known.placing is None:
+            return self.known.gradient_object
         return variance_model(DEFAULT_MODEL)(self.pictures).gradient_object
 
     def errors(self, station: Station) -> np.ndarray:
@@ -59,9 +61,10 @@ class Features:
         circle's centre in its plane and change of its radius (the scene's unit); the zones of forms, with the sign of
         the farthest point's side (the scene's unit). NaN where a feature is not seen.
         """
-        parts = [self._lines(station).ravel()]
-        parts += [self._circle(station, c) for c in range(len(self.known.circles))]
-        parts.append(np.array([self._form(station, quantity) for quantity in self.known.seen.forms]))
+        on_edges, *on_rims = self._displaced(station)
+        parts = [self._lines(on_edges).ravel()]
+        parts += [fit @ off for (_, _, fit), off in zip(self._rims, self._outwards(on_rims), strict=True)]
+        parts.append(np.array([self._form(on_edges, on_rims, quantity) for quantity in self.known.seen.forms]))
         return np.concatenate(parts)
 
     @cached_property
@@ -72,13 +75,12 @@ class Features:
         solid = self.pictures.scene.solid
         return nodes, edge_points(solid, view.names, nodes.spatial[..., 1:-1])
 
-    def _lines(self, station: Station) -> np.ndarray:
-        """(d, tan theta) of each edge, shape (E, 2): of the line through the points where they are found."""
+    def _lines(self, moved: np.ndarray) -> np.ndarray:
+        """(d, tan theta) of each edge, shape (E, 2): of the line through its points, displaced by (E, n, 2)."""
         view = self.known.view
         if not view.names:
             return np.zeros((0, 2))
-        nodes, points = self._nodes
-        moved, normal = self._displaced(station, points), normals(view)
+        (nodes, _), normal = self._nodes, normals(view)
         off = np.einsum("eni,ei->en", moved, normal)
         tangent = np.stack([normal[:, 1], -normal[:, 0]], -1)
         along = nodes.middle + nodes.t[..., 1:-1] + np.einsum("eni,ei->en", moved, tangent)
@@ -109,18 +111,17 @@ class Features:
         points = np.where(outline.seen[:, None], outline.points, curved.centre)
         return points, np.nan_to_num(outline.outward), _fit(limb_rim(self.pictures, curved))
 
-    def _circle(self, station: Station, c: int) -> np.ndarray:
-        points, normal, fit = self._rims[c]
-        off = np.einsum("ni,ni->n", self._displaced(station, points), normal)
-        return fit @ off
+    def _outwards(self, on_rims: list[np.ndarray]) -> list[np.ndarray]:
+        """Along the normals of each circle's image, (n,), displacements (n, 2)."""
+        return [np.einsum("ni,ni->n", moved, each[1]) for moved, each in zip(on_rims, self._rims, strict=True)]
 
-    def _form(self, station: Station, quantity: Quantity) -> float:
+    def _form(self, on_edges: np.ndarray, on_rims: list[np.ndarray], quantity: Quantity) -> float:
         """Of points that a perfect feature has elsewhere: their zone, which is as large to either side of an input."""
         name = place_of(quantity.features[0])
         if name in self.known.circles:
-            off, design = self._beside_rim(station, self.known.circles.index(name))
+            off, design = self._beside_rim(on_rims, self.known.circles.index(name))
         else:
-            off, design = self._beside_edge(station, quantity)
+            off, design = self._beside_edge(on_edges, quantity)
         if reference_of(quantity) != "nominal" and len(off):
             off = residues(design) @ off
         if not (len(off) and np.isfinite(off).all()):
@@ -128,31 +129,44 @@ class Features:
         size = needed(reference_of(quantity))(off)
         return float(size * np.sign(off[np.abs(off).argmax()]))
 
-    def _beside_edge(self, station: Station, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
+    def _beside_edge(self, moved: np.ndarray, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
         """Distances of an edge's points, the scene's unit, and the design of its line."""
         view = self.known.view
         e = view.names.index(place_of(quantity.features[0]))
         nodes, points = self._nodes
         normal = normals(view)[e]
         scale = self.known.seen.per_unit(quantity.features[0], points[e], normal)
-        off = self._displaced(station, points[e]) @ normal / scale
+        off = moved[e] @ normal / scale
         return off, np.stack([np.ones(off.size), nodes.t[e, 1:-1]], -1)
 
-    def _beside_rim(self, station: Station, c: int) -> tuple[np.ndarray, np.ndarray]:
+    def _beside_rim(self, on_rims: list[np.ndarray], c: int) -> tuple[np.ndarray, np.ndarray]:
         """Outward distances of a circle's points that are used, the scene's unit, and the design of its circle."""
-        points, normal, fit = self._rims[c]
+        fit = self._rims[c][2]
         used = (fit != 0).any(0) & np.isfinite(fit).all()
         each = self.pictures.scene.solid.round(self.known.circles[c])
         image = limb_rim(self.pictures, each) if isinstance(each, Curved) else rim(self.pictures, each)
         design = image.design[used]
-        off = np.einsum("ni,ni->n", self._displaced(station, points), normal)[used]
+        off = self._outwards(on_rims)[c][used]
         return off / design[:, 2], design[:, :3] / design[:, 2:3]
 
-    def _displaced(self, station: Station, points: np.ndarray) -> np.ndarray:
-        """How far off points (..., 3) are found, ideal px of the believed camera, shape (..., 2)."""
-        flat, camera = points.reshape(-1, 3), self.pictures.scene.camera
-        found = undistorted(station.record(flat), camera) - project_ideal(flat, self.pictures.sensors, camera)
-        return found.reshape(*points.shape[:-1], 2)
+    @cached_property
+    def _points(self) -> list[np.ndarray]:
+        """In space: along the edges (E, n, 3), then around each circle (n, 3)."""
+        on_edges = self._nodes[1] if self.known.view.names else np.zeros((0, 0, 3))
+        return [on_edges, *(points for points, _, _ in self._rims)]
+
+    @cached_property
+    def _believed(self) -> tuple[np.ndarray, np.ndarray]:
+        """All of them in a row (N, 3), and where the believed camera sees them, ideal px (N, 2)."""
+        flat = np.concatenate([each.reshape(-1, 3) for each in self._points])
+        return flat, project_ideal(flat, self.pictures.sensors, self.pictures.scene.camera)
+
+    def _displaced(self, station: Station) -> list[np.ndarray]:
+        """How far off the points are found, ideal px of the believed camera, (..., 2) for each of `_points`."""
+        flat, believed = self._believed
+        off = undistorted(station.record(flat), self.pictures.scene.camera) - believed
+        sizes = np.cumsum([each.size // 3 for each in self._points])[:-1]
+        return [some.reshape(*at.shape[:-1], 2) for some, at in zip(np.split(off, sizes), self._points, strict=True)]
 
 
 def _fit(seen: RimImage) -> np.ndarray:

@@ -56,10 +56,10 @@ def _by_placement(features: Features) -> dict[str, np.ndarray]:
     A measurement takes the place as it is found for the believed one, and begins anew; so the adjustment's own
     derivatives count, not those of a picture of a part far off.
     """
-    errors = variance_model(DEFAULT_MODEL)(features.pictures)
-    adjustment, known = errors.adjustment, errors.measurands
-    if adjustment is None or not known.datums:
+    known = features.known
+    if known.placing is None or not known.datums:
         return {}
+    adjustment = variance_model(DEFAULT_MODEL)(features.pictures).adjustment
     left = adjustment.left(known.gradient_object) / adjustment.placing.u
     return dict(zip(adjustment.placing.names, left.T, strict=True))
 

@@ -75,29 +75,38 @@ def terms(
     together : ndarray, shape (M,), optional
         Standard uncertainties by what two inputs do together (`planner.budgeting.products`).
     """
-    scene, known = pictures.scene, measurands(pictures)
-    pattern = _pattern(pictures, known) if scene.uncertainty.fixed_pattern else np.zeros(len(variances))
-    found, datums = [], _by_datums(pictures)
-    for m, each in enumerate(forecasts):
-        noise = float(np.sqrt(variances[m]))
-        rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), each.unit, 1.0, "noise")]
-        rows += _of_bias(known, m, each, noise, biases, biased) if doubts is None else _of_doubts(doubts, m, each.unit)
+    known, found = measurands(pictures), []
+    for m, (each, (noise, *still)) in enumerate(zip(forecasts, unbiased(pictures, variances), strict=True)):
+        sigma = float(np.sqrt(variances[m]))
+        rows = _of_bias(known, m, each, sigma, biases, biased) if doubts is None else _of_doubts(doubts, m, each.unit)
         if together is not None and together[m] > 0:
             rows.append(Term(TOGETHER, 0.0, Uncertain(sd=float(together[m])), each.unit, 1.0))
-        if datums[m] > 0:
-            rows.append(Term(DATUMS, 0.0, Uncertain(sd=float(datums[m])), each.unit, 1.0))
-        if pattern[m] > 0:
-            rows.append(Term(PATTERN, 0.0, Uncertain(sd=float(pattern[m])), each.unit, 1.0))
-        found.append(rows + _stated(scene, each))
+        found.append([noise, *rows, *still])
     return found
 
 
-def _by_datums(pictures: Pictures) -> np.ndarray:
+def unbiased(pictures: Pictures, variances: np.ndarray) -> list[list[Term]]:
+    """Of each of M quantities what is beside its bias: pixel noise first, datums, fixed pattern, rounding, temperature.
+
+    ``variances``: (M,), as of `terms`.
+    """
+    scene, known = pictures.scene, measurands(pictures)
+    pattern = _pattern(pictures, known) if scene.uncertainty.fixed_pattern else np.zeros(len(variances))
+    still, found = {DATUMS: _by_datums(pictures, known), PATTERN: pattern}, []
+    for m, quantity in enumerate(known.quantities):
+        unit, noise = scene.unit_of(quantity), Uncertain(sd=float(np.sqrt(variances[m])), type="A")
+        rows = [Term(NOISE, 0.0, noise, unit, 1.0, "noise")]
+        rows += [Term(name, 0.0, Uncertain(sd=float(u[m])), unit, 1.0) for name, u in still.items() if u[m] > 0]
+        found.append(rows + _stated(scene, unit, float(known.value_object[m])))
+    return found
+
+
+def _by_datums(pictures: Pictures, known: Measurands) -> np.ndarray:
     """Standard uncertainties (M,) by what the datums are off on the part; 0 where its place is known otherwise."""
-    errors = variance_model(DEFAULT_MODEL)(pictures)
-    if errors.adjustment is None:
-        return np.zeros(len(errors.measurands.quantities))
-    return np.sqrt(np.diag(errors.adjustment.by_datums(errors.measurands.gradient_object)))
+    adjustment = None if known.placing is None else variance_model(DEFAULT_MODEL)(pictures).adjustment
+    if adjustment is None:
+        return np.zeros(len(known.quantities))
+    return np.sqrt(np.diag(adjustment.by_datums(known.gradient_object)))
 
 
 def _of_bias(
@@ -121,17 +130,17 @@ def _model_error(known: Measurands, m: int, each: Forecast, sigma: float, biased
     return MOST * sigma
 
 
-def _stated(scene: Scene, each: Forecast) -> list[Term]:
+def _stated(scene: Scene, unit: str, value: float) -> list[Term]:
     """Rounding and temperature, as the scene says them."""
-    said, angle = scene.uncertainty, each.unit == "degrees"
+    said, angle = scene.uncertainty, unit == "degrees"
     step = said.rounding_deg if angle else said.rounding
-    rows = [Term(ROUNDING, 0.0, Uncertain(half_width=step / 2), each.unit, 1.0)] if step > 0 else []
+    rows = [Term(ROUNDING, 0.0, Uncertain(half_width=step / 2), unit, 1.0)] if step > 0 else []
     if angle or said.expansion_per_K is None:
         return rows
     excess = said.temperature_K or Uncertain(sd=0.0)
     away, per_k = excess.value or 0.0, said.expansion_per_K.value
-    rows.append(Term(TEMPERATURE, away, excess, "K", -each.value_object * per_k))
-    rows.append(Term(EXPANSION, per_k, said.expansion_per_K, "1/K", -each.value_object * away))
+    rows.append(Term(TEMPERATURE, away, excess, "K", -value * per_k))
+    rows.append(Term(EXPANSION, per_k, said.expansion_per_K, "1/K", -value * away))
     return rows
 
 
@@ -152,5 +161,4 @@ def _pattern(pictures: Pictures, known: Measurands) -> np.ndarray:
     still = Noise(
         sigma=math.sqrt(dark * noise.dsnu**2 + bright * (noise.prnu * signal) ** 2), dark_level=noise.dark_level
     )
-    changed = Pictures(scene.model_copy(update={"noise": still}), pictures.sensors, pictures.lights, pictures.closely)
-    return np.sqrt(variance_model("calibrated")(changed).variances_object)
+    return np.sqrt(variance_model(DEFAULT_MODEL)(pictures.with_noise(still)).variances_object)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from planner.designing.close import look
 from planner.designing.evaluation import Rated, rate_light, views
-from planner.designing.search import Design, Offer
+from planner.designing.outcome import Design, Offer
 from scenes.catalogue import ListedLight
 
 

@@ -12,13 +12,13 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.budgeting.plans import systematic
 from planner.budgeting.sources import sources
-from planner.budgeting.terms import terms
+from planner.budgeting.terms import unbiased
 from planner.constraints import Constraints
 from planner.designing.aspects import Aspect, aspects
 from planner.designing.optics import Focused, Settings, chosen, focused
 from planner.designing.stations import station
 from planner.designing.wishes import Wishes, allowed
-from planner.prediction import glanced, predict
+from planner.prediction import glanced
 from planner.search.grid import ViewingSpace, as_poses, by_light
 from planner.search.objective import cut_off
 from scenes import Picture, Pose, Scene
@@ -226,7 +226,5 @@ def _best_light(problem: Problem, settings: Settings, view: Viewed) -> Rated | N
 
 def _beside(scene: Scene, sensor: Pose, light: Any, noise: np.ndarray) -> np.ndarray:
     """Variances by noise, fixed pattern, rounding and temperature, (M,)."""
-    picture = Picture.of(scene, sensor, light)
-    told = predict(picture, closely=False).measurands
-    rows = terms(glanced(picture), told, noise, biased=False, doubts={})
+    rows = unbiased(glanced(Picture.of(scene, sensor, light)), noise)
     return np.array([sum((each.sensitivity * each.told.u) ** 2 for each in some) for some in rows])

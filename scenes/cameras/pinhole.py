@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from scenes.cameras.binning import Binning
 from scenes.cameras.blur_field import BlurField
 from scenes.cameras.kinds import CAMERAS
 from scenes.cameras.lens import Lens
@@ -79,6 +80,9 @@ class Camera(Model):
     """Width and height of the sensor; says ``width`` and ``height`` with the pitch [mm]."""
     working_distance_mm: Positive | None = None
     """The same as ``distance`` [mm]."""
+    binning: Binning | None = None
+    """Squares of pixels taken together: ``width``, ``height``, ``pixel_pitch_um`` and the noise are then said of the
+    sensor's pixels, what else is in px or grey levels of the picture. A scene that is read has those of the squares."""
 
     @model_validator(mode="after")
     def _not_too_large(self) -> Camera:
@@ -86,6 +90,12 @@ class Camera(Model):
             raise ValueError(
                 f"camera.width x height must be at most {MOST_PIXELS} pixels, got {self.width * self.height}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _binned_by_its_scene(self) -> Camera:
+        if self.binning is not None:
+            raise ValueError(f"camera.binning must stand in a scene, whose noise it changes, got {self.binning.kind}")
         return self
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from scenes.cameras.colour import Colour
-from scenes.catalogue.binning import Binning
+from scenes.catalogue.binning import ListedBinning
 from scenes.catalogue.entry import Contradiction, Entry, Said
 from scenes.model import Name, Title
 
@@ -71,7 +71,7 @@ class ListedSensor(Entry):
     """Shortest exposure [us]."""
     exposure_max_us: Said = None
     """Longest exposure [us]."""
-    binning: tuple[Binning, ...] = ()
+    binning: tuple[ListedBinning, ...] = ()
     """Modes that take pixels together; each is a sensor of its own for a search."""
     emva1288: Title | None = None
     """Result file of EMVA 1288's reference software (XML), relative to the catalogue: fills in what is not given."""

@@ -17,7 +17,8 @@ import numpy as np
 import scenes
 from planner.designing.close import look
 from planner.designing.evaluation import Problem, Rated, rate_light, views
-from planner.designing.search import Design, design
+from planner.designing.outcome import Design
+from planner.designing.search import design
 from planner.designing.wishes import Wishes
 from scenes.catalogue import Catalogue, ListedLens, ListedLight, ListedSensor
 

@@ -39,6 +39,7 @@ def test_the_sample_is_right_and_a_wrong_catalogue_is_not(folder):
         ((*ASKED, "--k", "2", "--false-acceptance", "0.1"), "--k must be left out with --false-acceptance, got 2"),
         ((*ASKED, "--false-acceptance", "0.1"), "uncertainty.process_sd must be given"),
         ((*ASKED, "--picture", "x.gif"), "--picture must end in .png, .svg, got 'x.gif'"),
+        ((*ASKED, "--prove", "2"), "--renders must be given with --prove, got 0"),
         ((*ASKED, "--farthest", "-1"), "--farthest must be at least 0, got -1"),
         (ASKED[:5], "lens_blur_um (--lens-blur) must be given for lenses without an MTF"),
         (

@@ -11,25 +11,16 @@ import pytest
 
 import scenes
 from imaging.geometry.projection import project
-from planner.designing import alternatives
+from planner.designing import ahead, alternatives, search
 from planner.designing.bounds import NOISE, REASONS, pairs
-from planner.designing.close import look
+from planner.designing.close import Close, look
 from planner.designing.dominance import of_light, of_sensor, undominated
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, limit_ratio, rate, rate_light, views
 from planner.designing.optics import ROLLING, TIME, Focused, blur_um, chosen, focused
-from planner.designing.search import (
-    COLOUR,
-    CONTRADICTORY,
-    INCOMPLETE,
-    LARGE,
-    PRICELESS,
-    Design,
-    Offer,
-    Tally,
-    design,
-    usable,
-)  # fmt: skip
+from planner.designing.outcome import Design, Offer, Tally
+from planner.designing.search import design
 from planner.designing.stations import carried, station
+from planner.designing.usable import COLOUR, CONTRADICTORY, INCOMPLETE, LARGE, PRICELESS, usable
 from planner.designing.wishes import Wishes, allowed
 from planner.uncertainty.risks import Limits, global_risks
 from scenes import InvalidInput, Jitter, Uncertainty, catalogue
@@ -279,3 +270,66 @@ def test_what_cannot_be_signed_is_tried_from_elsewhere_first(monkeypatch: pytest
     assert proofs(signed=True) == [own]
     there, other = proofs(signed=False)
     assert there == own != other
+
+
+def test_a_pair_whose_close_look_fails_is_tried_with_its_next_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Close looks are stood in for: only the dearer lens under the second light meets all when it is looked at so.
+
+    Its first light passes at a glance, and is known to show the edges by the cheaper lens, so that only the last look
+    contradicts it.
+    """
+    told = {("narrow", "a"): 2.0, ("narrow", "b"): 2.0, ("wide", "a"): 2.0, ("wide", "b"): 0.5}
+
+    def stood_in(_: Problem, rated: Rated) -> Close:
+        return Close((), ("ok",), told[rated.names[1:]], 0, 0.5)
+
+    for module in (search, ahead):
+        monkeypatch.setattr(module, "look", stood_in)
+    given = synthetic(11, 1, 40, 1)
+    glass = next(each for each in given.lenses if each.focal_length_mm == 25.0)
+    lenses = [glass.model_copy(update={"name": name, "price": price, "format": None, "image_circle_mm": circle})
+              for name, price, circle in (("narrow", 50.0, 30.0), ("wide", 60.0, 40.0))]  # fmt: skip
+    lamps = [ListedLight(name=name, price=price, kind="spot", outer_diameter_mm=wide, radiance=200.0)
+             for name, price, wide in (("a", 10.0, 20.0), ("b", 20.0, 21.0))]  # fmt: skip
+    parts = given.model_copy(update={"lenses": tuple(lenses), "lights": tuple(lamps)})
+    found = design(_problem(2.0), parts)
+    assert found.reached
+    assert found.best.rated.names[1:] == ("wide", "b")
+
+
+def _offers(*ratios: float) -> list[Offer]:
+    """By rising cost, with ratios that a search tells."""
+    return [Offer(float(k), SimpleNamespace(ratio=ratio)) for k, ratio in enumerate(ratios)]
+
+
+def test_as_many_of_the_front_are_rendered_as_are_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best first, then what is dearer and meets all, then what is cheaper, the dearest of it first."""
+    offers = _offers(2.0, 1.2, 0.9, 0.8)
+    given = Design(_problem(), offers[2], True, tuple(offers), Tally(1, 1, 1, {}, 1, {}, 1, 1, 1, True), False)
+
+    def tried(wanted: int, *wrong: int) -> tuple[list[float], float]:
+        def stood_in(_: Design, each: Offer, *more: object) -> SimpleNamespace:
+            return SimpleNamespace(offer=each, trusted=True, holds=each not in [offers[k] for k in wrong])
+
+        monkeypatch.setattr(designed, "prove", stood_in)
+        found, proofs = designed.proven(given, 0, wanted=wanted)
+        return [each.offer.cost for each in proofs], found.best.cost
+
+    assert tried(1) == ([2.0], 2.0)
+    assert tried(1, 2) == ([2.0, 3.0], 3.0)
+    assert tried(1, 2, 3) == ([2.0, 3.0], 2.0)
+    assert tried(3) == ([2.0, 3.0, 1.0], 2.0)
+    assert tried(3, 2) == ([2.0, 3.0, 1.0, 0.0], 3.0)
+
+
+@pytest.mark.parametrize(
+    ("told", "rendered", "signed", "agrees", "holds"),
+    [(0.9, 0.99, True, True, True), (0.9, 1.01, True, True, False), (1.2, 1.25, True, True, True),
+     (1.2, 1.3, True, True, False), (0.9, 0.9, False, True, False), (0.9, 0.9, True, False, False)],
+)  # fmt: skip
+def test_a_proof_holds_where_all_is_as_told(
+    told: float, rendered: float, signed: bool, agrees: bool, holds: bool
+) -> None:
+    budget = SimpleNamespace(statuses=("ok", "ok" if signed else "clutter"))
+    run = SimpleNamespace(verdict=SimpleNamespace(agrees=agrees))
+    assert designed.StationProof(_offers(told)[0], budget, rendered, run).holds is holds

@@ -82,3 +82,27 @@ def test_a_sharp_image_is_bent_by_straight_lines_between_fine_pixels():
         assert found[row, column] == pytest.approx(np.array([1 - v, v]) @ around @ np.array([1 - u, u]), rel=1e-9)
         # margin: an inequality that says where the point lies
         assert 0.005 < min(u, v) < max(u, v) < 0.995  # between fine pixels
+
+
+def _slope(radius: np.ndarray, variance: float) -> float:
+    """Slope in the middle of an edge of height 1 that discs (n,) and a Gaussian of a variance have blurred, by angles
+    of the disc's chords."""
+    angle = (np.arange(2000) + 0.5) / 2000 * np.pi
+    at = radius[:, None] * np.cos(angle)
+    smooth = np.exp(-(at**2) / (2 * variance)) / np.sqrt(2 * np.pi * variance)
+    return float((2 * np.sin(angle) ** 2 * smooth).mean())
+
+
+@pytest.mark.parametrize(("ends", "within"), [(1.0, 0.014), (2.0, 0.06)])
+def test_a_band_of_foci_blurs_as_its_second_moment_says(ends: float, within: float) -> None:
+    """Discs of a focus that is spread evenly to +-``ends`` px, about depths of up to 1 px, against one Gaussian.
+
+    The variance of an edge point goes as 1 / slope^2; the spread ignored is told too small by more.
+    """
+    base = 1.0 + 0.6**2 + 1 / 12  # locator, lens and pixel
+    spread = np.linspace(-ends, ends, 201)[1::2]
+    for depth in (0.0, 0.5, 1.0):
+        true = _slope(np.abs(depth + spread), base)
+        told, ignored = (_slope(np.zeros(1), base + more / 4) for more in (depth**2 + ends**2 / 3, depth**2))
+        assert (true / told) ** 2 == pytest.approx(1, abs=within)
+        assert (true / ignored) ** 2 < 1 - 2 * within

@@ -21,7 +21,7 @@ from validation.report.terminal import console
 from validation.strict_json import plain
 
 if TYPE_CHECKING:
-    from planner.designing.search import Design, Offer
+    from planner.designing.outcome import Design, Offer
     from planner.designing.wishes import Wishes
     from validation.designed import StationProof
 
@@ -63,6 +63,7 @@ class Options:
     renders: Annotated[
         int, typer.Option(metavar="N", help="Prove the station: simulate its biases, and measure N noisy pictures.")
     ] = 0
+    prove: Annotated[int, typer.Option(metavar="N", help="So many stations of the front, with --renders.")] = 1
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw cost against U (.png, .svg).")] = None
     write: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Write the station as a scene.")] = None
     as_json: Json = False
@@ -80,6 +81,9 @@ def design_command(given: Options) -> None:
     from validation import designed
 
     check_number("--renders", given.renders, 0, 1_000_000)
+    check_number("--prove", given.prove, 1, 100)
+    if given.prove > 1 and not given.renders:
+        raise scenes.InvalidInput(f"--renders must be given with --prove, got {given.renders}")
     check_file("--picture", given.picture, ".png", ".svg")
     check_file("--write", given.write, ".toml")
     wishes = _wishes(given)
@@ -90,7 +94,7 @@ def design_command(given: Options) -> None:
     seconds, proofs = time.perf_counter() - began, ()
     if given.renders:
         with progress(f"{scene.name}: rendering the station", "images", at_once=True) as shown:
-            found, proofs = designed.proven(found, given.renders, shown)
+            found, proofs = designed.proven(found, given.renders, shown, given.prove)
     if given.write is not None:
         designed.write(found, given.scene, given.write)
     if given.picture is not None:
@@ -98,7 +102,7 @@ def design_command(given: Options) -> None:
 
         design_figure.draw(found, parts.currency, given.picture)
     _show(found, parts, proofs, seconds, given)
-    if not found.reached or (proofs and not proofs[-1].holds):
+    if not found.reached or (proofs and sum(each.holds for each in proofs) < given.prove):
         raise typer.Exit(1)
 
 
@@ -169,8 +173,8 @@ def facts(found: Design, parts: catalogue.Catalogue, proofs: tuple[StationProof,
             "close": searched.close, "complete": searched.complete,
         },
         "proofs": [
-            {"names": list(each.offer.rated.names), "ratio": each.ratio, "statuses": list(each.budget.statuses),
-             "holds": each.holds, "verdict": each.run and each.run.verdict.text}
+            {"names": list(each.offer.rated.names), "told": each.offer.ratio, "ratio": each.ratio,
+             "statuses": list(each.budget.statuses), "holds": each.holds, "verdict": each.run and each.run.verdict.text}
             for each in proofs
         ],
         "seconds": seconds,
@@ -180,7 +184,7 @@ def facts(found: Design, parts: catalogue.Catalogue, proofs: tuple[StationProof,
 def _signed(found: Design, proofs: tuple[StationProof, ...]) -> bool:
     """Whether all values of the best may be signed: by its proof, or as predicted."""
     if proofs:
-        return proofs[-1].holds
+        return any(each.holds and each.offer is found.best for each in proofs)
     close = found.best and found.best.close
     return bool(close) and all(map(is_trusted, close.statuses))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from planner.designing.search import Design
+from planner.designing.outcome import Design
 from validation.report.canvas import TEXT, WIDTH, plt, save
 from validation.report.design_words import u_over_t
 

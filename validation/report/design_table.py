@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Group
 from rich.text import Text
 
-from planner.designing.search import Design, Offer
+from planner.designing.outcome import Design, Offer
 from scenes.status import is_trusted
 from validation.designed import StationProof
 from validation.report import design_words
@@ -72,7 +72,8 @@ def _ratio(found: Design, offer: Offer) -> str:
 def _proof(proof: StationProof) -> list[str]:
     states = "all values may be signed" if proof.trusted else f"statuses {', '.join(proof.budget.statuses)}"
     names = " + ".join(proof.offer.rated.names)
-    lines = [f"{names}, rendered: worst U over what is allowed {proof.ratio:.3f}, biases taken off; {states}."]
+    told = f"{proof.ratio:.3f} (told {proof.offer.ratio:.3f})"
+    lines = [f"{names}, rendered: worst U over what is allowed {told}, biases taken off; {states}."]
     if proof.run is not None:
         lines.append(f"Noisy pictures: {proof.run.verdict.text}")
     return lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from planner.designing.search import Design, Offer
+from planner.designing.outcome import Design, Offer
 from validation.report.source_words import words
 
 _NAMED = 3  # sources
