@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from measure.correction import Correction
+from measure.covariances import of_measured, scaled
 from measure.estimators.registry import best_estimator
 from measure.features.forms import FoundForm
+from measure.known_bias import Correction
 from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import MeasuredFeatures, find
 from measure.saturation import saturated
@@ -193,8 +194,8 @@ def corrected(found: Measurements, correction: Correction, image: np.ndarray) ->
         found,
         value=found.value - off,
         value_image=found.value_image - off_image,
-        covariance=_scaled(found.covariance, correction.covariance, doubtful),
-        covariance_image=_scaled(found.covariance_image, correction.covariance_image, doubtful),
+        covariance=scaled(found.covariance, correction.covariance, doubtful),
+        covariance_image=scaled(found.covariance_image, correction.covariance_image, doubtful),
         status=states,
         first=found.first and _first_corrected(found.first, off_image[..., 0], states[..., 0]),
         bias=off,
@@ -207,14 +208,6 @@ def _first_corrected(first: Measurement, bias: np.ndarray, states: np.ndarray) -
     return replace(
         first, value_px=first.value_px - bias, bias_px=np.where(measured, bias, 0.0), status=states
     )  # fmt: skip
-
-
-def _scaled(covariance: np.ndarray, propagated: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Covariances (..., M, M) with the marked variances replaced by propagated ones, correlations as they are."""
-    own, told = np.einsum("...mm->...m", covariance), np.diag(propagated)
-    usable = which & np.isfinite(own) & (own > 0) & np.isfinite(told)
-    factor = np.sqrt(np.divide(told, own, out=np.ones(own.shape), where=usable))
-    return covariance * factor[..., :, None] * factor[..., None, :]
 
 
 def measure_by(
@@ -245,8 +238,8 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         nominal=np.array(told, float),
         value_image=np.where(measured, found.image.value, np.nan).reshape(*lead, count),
         value=np.where(measured, found.plane.value, np.nan).reshape(*lead, count),
-        covariance_image=_known(found.image.covariance, measured).reshape(*lead, count, count),
-        covariance=_known(found.plane.covariance, measured).reshape(*lead, count, count),
+        covariance_image=of_measured(found.image.covariance, measured).reshape(*lead, count, count),
+        covariance=of_measured(found.plane.covariance, measured).reshape(*lead, count, count),
         status=found.status.reshape(*lead, count),
         p_value=found.shape.p_value.reshape(lead),
         first=of_first(found, picture, lead) if quantities[0].kind == "distance" else None,
@@ -257,9 +250,3 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         u_placed=np.sqrt(np.einsum("nmm->nm", found.placed)).reshape(*lead, count),
         forms={quantity.name: form.found for quantity, form in found.forms.items()},
     )
-
-
-def _known(covariance: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    both = measured[:, :, None] & measured[:, None, :]
-    lost = np.where(np.eye(measured.shape[1], dtype=bool), np.inf, np.nan)
-    return np.where(both, covariance, lost)
