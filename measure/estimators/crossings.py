@@ -77,7 +77,11 @@ def is_reversed(profiles: np.ndarray) -> np.ndarray:
     """Whether the two halves of the edge brighten in opposite directions, each as clearly as the other, (n,)."""
     up = rise(profiles)
     first, second = (part.mean(0) for part in np.array_split(up, 2))
-    noise = np.abs(np.diff(up, axis=0)).mean(0)
+    return are_opposite(first, second, np.abs(np.diff(up, axis=0)).mean(0))
+
+
+def are_opposite(first: np.ndarray, second: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Whether mean rises of two halves of an edge are of opposite signs, beside their mean change from place to place."""
     return (first * second < 0) & (np.minimum(np.abs(first), np.abs(second)) > 2 * noise)
 
 
@@ -95,10 +99,15 @@ def bracket(signed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _started(signed: np.ndarray, fall: np.ndarray, best: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `bracket` says of a choice (m, n) among the places that have a fall."""
-    here = np.take_along_axis(signed[:, 1:-2], best[:, None], 1)[:, 0]
-    drop = np.take_along_axis(fall, best[:, None], 1)[:, 0]
+    (here,), (drop,) = _taken(signed, best, (1,)), _taken(fall, best, (0,))
     found = drop > 0
     return best + 1, best + 1 + np.where(found, here / np.where(found, drop, 1), 0), found
+
+
+def _taken(values: np.ndarray, place: np.ndarray, beside: tuple[int, ...]) -> np.ndarray:
+    """Of values (m, T, n) those at places (m, n) and beside, (k, m, n); as `numpy.take_along_axis`, which is slower."""
+    m, _, n = values.shape
+    return values[np.arange(m)[:, None], place + np.array(beside)[:, None, None], np.arange(n)]
 
 
 class Crossings(NamedTuple):
@@ -170,13 +179,13 @@ def _clear(signed: np.ndarray, crossing: np.ndarray) -> np.ndarray:
 
     Where it hardly leaves zero, another crossing is about to take this one away, or did so.
     """
-    before, here, after, beyond = (np.take_along_axis(signed, crossing[:, None] + k, 1)[:, 0] for k in (-1, 0, 1, 2))
+    before, here, after, beyond = _taken(signed, crossing, (-1, 0, 1, 2))
     return np.maximum(np.minimum(np.maximum(before, here), -np.minimum(after, beyond)), 0.0)
 
 
 def refine(signed: np.ndarray, crossing: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Root (in steps) of the cubic through the four values around the crossing, and its slope there; shape (m, n)."""
-    values = np.stack([np.take_along_axis(signed, crossing[:, None] + k, 1)[:, 0] for k in (-1, 0, 1, 2)])
+    values = _taken(signed, crossing, (-1, 0, 1, 2))
     c0 = values[1]
     c1 = -values[0] / 3 - values[1] / 2 + values[2] - values[3] / 6
     c2 = (values[0] + values[2]) / 2 - values[1]

@@ -110,7 +110,7 @@ class RimFit:
 
     def is_far(self, errors: np.ndarray) -> np.ndarray:
         """Whether circles with errors (n, p) are farther from the expected one than the locator captures, bool (n,)."""
-        return np.abs(np.nan_to_num(errors) @ self.design.T).max(-1) > CAPTURE
+        return np.abs(_known(errors) @ self.design.T).max(-1) > CAPTURE
 
     def states(self, points: EachPoint, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Statuses (n,), and whether so many points are found that the circle must be where they say, or near it."""
@@ -127,7 +127,7 @@ class RimFit:
         number = np.convolve(np.ones(contrast.shape[1]), np.ones(_SMOOTH), "same")
         smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
         inverse = np.where(self.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
-        return np.nan_to_num(fit * inverse[:, None])
+        return _known(fit * inverse[:, None])
 
     def as_expected(self, valid: np.ndarray, contrast: np.ndarray) -> np.ndarray:
         """Which of the valid places (n, m) show a contrast (n, m) for which their weights were given, bool (n, m).
@@ -142,7 +142,7 @@ class RimFit:
         share = np.where(taken, contrast / np.where(self.contrast > 0, self.contrast, np.inf), np.nan)
         some = taken.any(1)
         middle = np.full(len(valid), np.nan)
-        middle[some] = np.nanmedian(share[some], 1)
+        middle[some] = [np.median(row[each]) for row, each in zip(share[some], taken[some], strict=True)]
         return valid & ~(share < _EXPECTED * middle[:, None])
 
     def solve(self, fit: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -159,7 +159,7 @@ class RimFit:
         """How far outwards crossings (n, m) of circles with errors (n, p) lie beside the first order, ideal px."""
         if self.curve is None:
             return np.zeros((len(found), len(self.design)))
-        near = np.nan_to_num(found)
+        near = _known(found)
         near = np.where(np.abs(near @ self.design.T).max(-1, keepdims=True) <= _NEAR, near, 0.0)
         second = self.curve.second_order(near)
         return second + self.curve.sampled(near @ self.design.T + second, self.optics)
@@ -178,3 +178,8 @@ class RimFit:
         found = np.einsum("nij,mj,nm->nim", found, self.design, weights)
         found[~good] = np.nan
         return found
+
+
+def _known(values: np.ndarray) -> np.ndarray:
+    """0 where there is no number."""
+    return np.where(np.isfinite(values), values, 0.0)
