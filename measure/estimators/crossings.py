@@ -81,7 +81,7 @@ def is_reversed(profiles: np.ndarray) -> np.ndarray:
 
 
 def are_opposite(first: np.ndarray, second: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Whether mean rises of two halves of an edge are of opposite signs, beside their mean change from place to place."""
+    """Whether two halves of an edge brighten in opposite directions on the mean, beside how much places differ."""
     return (first * second < 0) & (np.minimum(np.abs(first), np.abs(second)) > 2 * noise)
 
 

@@ -113,7 +113,8 @@ def at_ends(level: np.ndarray, slope: np.ndarray, lengths: np.ndarray) -> np.nda
 def end_errors(covariance: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Standard deviation of each line's offset at its two ends, px, (n, E, 2), from the lines' covariance."""
     a, b, ab = (np.einsum("nee->ne", covariance[:, i::2, j::2]) for i, j in ((0, 0), (1, 1), (0, 1)))
-    return np.nan_to_num(np.sqrt(np.stack([a, a + 2 * lengths * ab + lengths**2 * b], -1)))
+    found = np.sqrt(np.stack([a, a + 2 * lengths * ab + lengths**2 * b], -1))
+    return np.where(np.isnan(found), 0.0, found)
 
 
 def capture(least: float, errors: np.ndarray) -> np.ndarray:

@@ -6,12 +6,13 @@ NumPy alone: a recipe (`validation.recipe`) has this file.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from imaging.features.locator import MIN_CONTRAST
-from imaging.features.sampling import sampled_places
+from imaging.features.sampling import amplitudes, shifted_by
 from measure.features.points import EachPoint
 from scenes import status
 
@@ -56,14 +57,13 @@ class Curve:
         """
         return -self.bend * (found[:, :2] @ self.along.T) ** 2
 
-    def sampled(self, moved: np.ndarray, optics: Optics) -> np.ndarray:
+    def sampled(self, moved: np.ndarray, optics: Optics, amplitude: np.ndarray) -> np.ndarray:
         """How far outwards pixels move the crossings of a rim that lies ``moved`` outwards, both (n, m), ideal px.
 
-        It is a sine of the place where the rim runs along their rows or columns.
+        It is a sine of the place where the rim runs along their rows or columns, of an amplitude (m, 2).
         """
         there = self.places + (moved / self.gain)[..., None] * self.normals
-        shift = sampled_places(there, self.normals, optics.blur_at(self.places), optics.scale_px)
-        return self.gain * (shift + optics.mixed_at(there, self.normals))
+        return self.gain * (shifted_by(amplitude, there) + optics.mixed_at(there, self.normals))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,10 +162,24 @@ class RimFit:
         near = _known(found)
         near = np.where(np.abs(near @ self.design.T).max(-1, keepdims=True) <= _NEAR, near, 0.0)
         second = self.curve.second_order(near)
-        return second + self.curve.sampled(near @ self.design.T + second, self.optics)
+        return second + self.curve.sampled(near @ self.design.T + second, self.optics, self._amplitude)
+
+    @cached_property
+    def _amplitude(self) -> np.ndarray:
+        """Of what sampling by pixels does at the places of a circle, px, (m, 2)."""
+        return amplitudes(self.curve.normals, self.optics.blur_at(self.curve.places), self.optics.scale_px)
 
     def fit(self, valid: np.ndarray) -> np.ndarray:
         """Least-squares maps (n, p, m) from offsets at the valid places (n, m) to the parameters."""
+        if valid.all():
+            return np.broadcast_to(self._of_all, (len(valid), *self._of_all.shape))
+        return self._fit(valid)
+
+    @cached_property
+    def _of_all(self) -> np.ndarray:
+        return self._fit(np.ones((1, len(self.weights)), bool))[0]
+
+    def _fit(self, valid: np.ndarray) -> np.ndarray:
         weights = self.weights * valid
         gram = np.einsum("nm,mi,mj->nij", weights, self.design, self.design)
         scale = np.sqrt(np.einsum("nii->ni", gram))

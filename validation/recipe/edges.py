@@ -159,9 +159,10 @@ class Edges:
         """Whether a line lies farther off than it is caught, and all edges are where a shift or a turn takes them."""
         if self.shown.size < len(self.fixed):
             return False
-        offsets = at_ends(*lines.T[:, None], self.lengths)
-        errors = end_errors(covariance[None], self.lengths)
-        if (np.abs(offsets) <= capture(self.limits[1], errors)).all() or self.aligned is None:
+        offsets = np.abs(at_ends(*lines.T[:, None], self.lengths))
+        if self.aligned is None or (offsets <= self.limits[1]).all():
+            return False
+        if (offsets <= capture(self.limits[1], end_errors(covariance[None], self.lengths))).all():
             return False
         return bool(self.aligned.poses(image.reshape(1, -1)).any())
 

@@ -309,7 +309,7 @@ def _of(found: Any, name: str) -> Any:
 
 
 def _of_budget(pair: list[Any]) -> tuple[float | None, float, list[float]]:
-    """Variance of all rows but noise, bias and model, their u^4 over degrees of freedom, the model's u, and per sigma."""
+    """Variance of all rows but noise, bias and model, their u^4 / dof; the model's u, alone and per sigma."""
     if pair[0] is None:
         return None, 0.0, [0.0, 0.0]
     kept_rows = [

@@ -80,12 +80,8 @@ def _check(answer: dict[str, Any], made: Export, picture: np.ndarray) -> None:
     for mine, own in zip(answer["measurands"], as_told(inspection.inspect(found)), strict=True):
         for key in _TOLD:
             one, other = mine[key], own[key]
-            alike = (
-                math.isclose(one, other, rel_tol=_ALIKE)
-                if isinstance(other, float) and one is not None
-                else one == other
-            )
-            if not alike:
+            numbers = isinstance(one, float) and isinstance(other, float)
+            if one != other and not (numbers and math.isclose(one, other, rel_tol=_ALIKE)):
                 raise RuntimeError(f"the recipe answers {key} of {own['name']} by {one}, the program by {other}")
 
 

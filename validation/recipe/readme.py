@@ -13,15 +13,8 @@ def readme(facts: dict[str, Any]) -> str:
     sensor, light = _pose(facts["sensor"]), " ".join(map(_pose, facts["light"]))
     beside = (f' --light "{light}"' if light else "") + (" --as-measured" if facts["as_measured"] else "")
     off = "no bias is taken off" if facts["as_measured"] else "the bias that a simulation tells is taken off"
-    return _TEXT.format(
-        rows=rows,
-        pose=sensor,
-        lamp=light or "its place in the scene",
-        beside=beside,
-        off=off,
-        displaced=DISPLACED,
-        **facts,
-    )
+    told = {"pose": sensor, "lamp": light or "its place in the scene", "beside": beside, "off": off, "rows": rows}
+    return _TEXT.format(**facts, **told, displaced=DISPLACED)
 
 
 def _pose(pose: list[float]) -> str:

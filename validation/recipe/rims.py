@@ -86,7 +86,8 @@ class Rim:
         variance = self.sensor.variance(used[self._pixels])
         if isinstance(variance, float):
             one, other, products = self._products
-            return variance * ((maps[:, one] * products) @ maps[:, other].T)
+            half = (maps.take(one, 1) * products) @ maps.take(other, 1).T
+            return variance * (half + half.T)
         rows = self.places.responses(maps, self.part)[1]
         return (rows * variance) @ rows.T
 
@@ -96,8 +97,10 @@ class Rim:
 
     @cached_property
     def _products(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the responses of two places to pixels where both have some: which two, and the product."""
+        """Of the responses of two places to pixels where both have some: which two, each pair once, and the product,
+        half of it of a place with itself."""
         rows = self.places.responses(np.eye(len(self.fit.design)), self.part)[1]
         products = rows @ rows.T
-        one, other = np.nonzero(products)
+        np.fill_diagonal(products, products.diagonal() / 2)
+        one, other = np.nonzero(np.triu(products))
         return one, other, products[one, other]

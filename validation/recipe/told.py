@@ -62,8 +62,8 @@ class Characteristic:
     fourth : float
         Sum over these sources of u^4 over their degrees of freedom.
     model : (constant, of sigma)
-        Standard uncertainty by the estimator's model where no bias is taken off: the larger of a number and a multiple
-        of sigma.
+        Standard uncertainty by the estimator's model where no bias is taken off: a number, and a multiple of
+        sigma.
     """
 
     name: str
