@@ -1,6 +1,6 @@
 """How long a recipe takes a picture: ``python -m tests.benchmarks.recipe FOLDER ...`` of folders by `ice export`.
 
-Whole numbers of 8 bits with noise, one core. Wall time, and processor time, which tells more on a machine that is shared.
+Whole numbers of 8 bits with noise, one core: wall time, and processor time, which tells more where others work, too.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ def measured(folder: Path) -> str:
     image = np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
     recipe.measure(image)
     prepared = time.process_time() - begun
-    wall, own = (_milliseconds(lambda: recipe.measure(image), clock) for clock in (time.perf_counter, time.process_time))
+    wall, own = (
+        _milliseconds(lambda: recipe.measure(image), clock) for clock in (time.perf_counter, time.process_time)
+    )
     names = len(recipe.values)
     return (
         f"{folder.name}: {names} values, {len(recipe.places.pixels)} pixels, prepared in {prepared:.1f} s; a picture: "

@@ -17,11 +17,11 @@ from measure import Images
 from scenes import Noise, Picture
 from tests.commands import ice
 from tests.oracle import block_image
-from validation import inspection, kept
-from validation.cli.measurands import facts
+from tests.recipes import loaded, noisy, same
+from validation import kept
 from validation.recipe import folder as folders
 from validation.recipe.export import check, export
-from validation.recipe.runtime import DISPLACED, Recipe
+from validation.recipe.runtime import DISPLACED
 from validation.strict_json import dumps, plain
 
 POSES = (30, 90), (15, 270)
@@ -63,75 +63,36 @@ def recipes(known, tmp_path_factory):
     picture, _, correction = known
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kept, "correction", lambda *_: correction)
-        return [_loaded(export(picture, as_measured=bare), tmp_path_factory.mktemp("recipe")) for bare in (False, True)]
-
-
-def _loaded(made, folder):
-    (folder / "facts.json").write_text(dumps(plain(made.facts)))
-    (folder / "formulas.py").write_text(made.formulas)
-    np.savez(folder / "arrays.npz", **made.arrays)
-    return Recipe.load(folder)
-
-
-def _program(image, picture, correction):
-    found = measure.measure(image, picture, estimator="gradient")
-    if correction is not None and np.isfinite(found.value).any():
-        found = measure.corrected(found, correction, image)
-    told = inspection.inspect(found)
-    return facts(told), plain(told.covariance)
-
-
-def _same(recipe, image, picture, correction):
-    """That a recipe answers as the program does, to 1e-12 of each number."""
-    found, (rows, covariance) = recipe.measure(image), _program(image, picture, correction)
-    for mine, own in zip(found["measurands"], rows, strict=True):
-        assert mine.keys() <= own.keys()
-        numbers = {key for key in mine if isinstance(mine[key], float) and isinstance(own[key], float)}
-        for key in mine.keys() - numbers:
-            assert mine[key] == own[key], (key, mine, own)
-        for key in numbers:
-            assert mine[key] == pytest.approx(own[key], rel=1e-12, abs=1e-12 * (own["sigma"] or 0.0)), (key, mine, own)
-    np.testing.assert_allclose(
-        np.array(found["covariance"], float), np.array(covariance, float), rtol=1e-11, atol=1e-25
-    )
-    return [each["status"] for each in found["measurands"]]
-
-
-def _noisy(clean, picture, rng, light=1.0):
-    """As recorded under so many times the light."""
-    noise = picture.scene.noise
-    signal = light * (clean - noise.dark_level)
-    sigma = np.sqrt(noise.sigma**2 + noise.gain * np.maximum(signal, 0))
-    return np.clip(np.rint(noise.dark_level + signal + sigma * rng.standard_normal(clean.shape)), 0, 255)
+        return [loaded(export(picture, as_measured=bare), tmp_path_factory.mktemp("recipe")) for bare in (False, True)]
 
 
 @pytest.mark.parametrize("light", [1.0, 1.4, 0.02, 0.0])
 def test_as_the_program_answers(known, recipes, light):
     """Good pictures, saturated ones and dark ones."""
     picture, clean, correction = known
-    image = _noisy(clean, picture, np.random.default_rng(int(100 * light)), light)
-    states, _ = (_same(recipe, image, picture, off) for recipe, off in zip(recipes, (correction, None), strict=True))
+    image = noisy(clean, picture, np.random.default_rng(int(100 * light)), light)
+    states, _ = (same(recipe, image, picture, off) for recipe, off in zip(recipes, (correction, None), strict=True))
     assert light != 1.0 or states == ["ok"] * 3
     assert light != 0.0 or states == ["low_contrast"] * 3
 
 
 def test_a_part_that_is_half_hidden(known, recipes):
     picture, clean, correction = known
-    image = _noisy(clean, picture, np.random.default_rng(5))
+    image = noisy(clean, picture, np.random.default_rng(5))
     image[:, : image.shape[1] // 2] = picture.scene.noise.dark_level
-    assert "low_contrast" in _same(recipes[0], image, picture, correction)
+    assert "low_contrast" in same(recipes[0], image, picture, correction)
 
 
 def test_a_displaced_part_is_not_measured(known, recipes):
     """Half a pixel is followed, three are told: no value, no decision."""
     picture, clean, _ = known
-    image = _noisy(clean, picture, np.random.default_rng(6))
+    image = noisy(clean, picture, np.random.default_rng(6))
     for row in recipes[0].measure(np.roll(image, 3, 1))["measurands"]:
         assert row["status"] == DISPLACED
         assert row["value"] is row["sigma"] is row["U"] is None
         assert row["decision"] == ("undecided" if row["tolerance"] else None)
     half = (image + np.roll(image, 1, 1)) / 2
-    assert DISPLACED not in _same(recipes[1], half, picture, None)
+    assert DISPLACED not in same(recipes[1], half, picture, None)
 
 
 @pytest.mark.parametrize(("image", "message"), [
@@ -146,7 +107,7 @@ def test_what_is_no_picture(recipes, image, message):
 
 def test_whole_numbers_are_levels(known, recipes):
     picture, clean, _ = known
-    image = _noisy(clean, picture, np.random.default_rng(7))
+    image = noisy(clean, picture, np.random.default_rng(7))
     assert recipes[0].measure(image.astype(np.uint8)) == recipes[0].measure(image)
 
 

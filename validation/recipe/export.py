@@ -70,12 +70,15 @@ def export(picture: Picture, estimator: str = ESTIMATOR, *, as_measured: bool = 
         If something of the scene cannot be measured by a recipe.
     """
     check(picture, estimator)
-    correction = None if as_measured else kept.correction(picture, Method(estimator))
     known, layout = measurands(Pictures.of(picture)), layout_of(picture)
     tools = [rim_tool(picture, name, unmoved(picture, name)) for name in known.circles]
     edges, places, starts = _of_edges(layout, estimator)
     rims, own, parts = _of_rims(tools, int(starts[-1]))
+    if not [*places, *own]:
+        pose = ",".join(f"{angle:g}" for angle in picture.sensor)
+        raise InvalidInput(f"--sensor must be a place from which something can be measured, got {pose}")
     values, formulas = _of_values(known, layout, estimator)
+    correction = None if as_measured else kept.correction(picture, Method(estimator))
     told, numbers = _of_correction(correction)
     characteristics, whole = _of_budgets(picture, correction)
     optics, noise = layout.optics, picture.scene.noise

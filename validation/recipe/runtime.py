@@ -122,6 +122,10 @@ class Recipe:
             If it is no picture of the camera's size.
         """
         image = self._checked(image)
+        with np.errstate(all="ignore"):  # what is not found is no number
+            return self._measured(image)
+
+    def _measured(self, image: np.ndarray) -> dict[str, Any]:
         used = image.reshape(-1)[self.places.pixels].astype(float)
         profiles = self.places.profiles(used)
         edges = self.edges.find(used, profiles[: len(self.edges.along)], image)
