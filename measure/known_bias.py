@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,7 +66,7 @@ class Correction:
     saturated: tuple[np.ndarray, np.ndarray] | None = None
     adjusted: Adjusted | None = None
 
-    @property
+    @cached_property
     def u_bias(self) -> np.ndarray:
         """Standard uncertainty of `bias`, shape (M,); infinite where it is not known."""
         return _together(self.sources, self.bias)
@@ -86,7 +87,7 @@ class Correction:
         """The same in the image."""
         return self.sources_image[RENDERING] * np.sqrt(1 + self.renders / self.beside_renders)
 
-    @property
+    @cached_property
     def sigma(self) -> np.ndarray:
         """Standard deviations by noise in the object, shape (M,)."""
         return np.sqrt(np.diag(self.covariance))
@@ -134,8 +135,8 @@ class Correction:
 
         Textures scatter by what `measure.unevenness` tells, and where it does, count in `u_bias` alone.
         """
-        texture = np.nan_to_num(self.sources.get(TEXTURE, np.zeros(len(self.bias))), posinf=0.0)
         told = self.u_bias if u_bias is None else u_bias
+        texture = np.nan_to_num(self.sources[TEXTURE], posinf=0.0) if TEXTURE in self.sources else 0.0
         with np.errstate(invalid="ignore"):  # infinite stays so
             left = np.where(of & np.isfinite(told), np.sqrt(np.maximum(told**2 - texture**2, 0.0)), np.inf)
         told = zip(found, self.simulated, left, self.sigma, self.quantities, strict=True)

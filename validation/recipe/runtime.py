@@ -190,7 +190,7 @@ class Recipe:
             (of,) = told.is_of(np.array([saturated]))
             doubtful = _are(states, (status.CLUTTER, status.MISFIT))
             states = _after(told, states, of, u_bias)
-            off, u_bias = np.nan_to_num(off), np.where(of, u_bias, np.inf)
+            off, u_bias = np.where(np.isnan(off), 0.0, off), np.where(of, u_bias, np.inf)
             value, covariance = value - off, scaled(covariance, told.covariance, doubtful)
         sigma = np.sqrt(np.diag(covariance))
         there = with_budget(self.characteristics, sigma.tolist(), self.facts["whole"])
