@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
+from imaging.cut_off import MARGIN, cut_off
 from scenes import Noise
 
-_MARGIN = 6.0  # standard deviations below the end of the scale within which it is felt
 _EVEN = 0.7  # grey levels of noise that rounding adds a twelfth to, wherever the level lies
 _QUIETEST = 5  # grey levels that less noise reaches
 
@@ -36,21 +36,14 @@ def recorded(noise: Noise, level: np.ndarray) -> Levels:
     """
     level = np.asarray(level, float)
     full = full_scale(noise)
-    if noise.gain == 0 and not (level > full - _MARGIN * math.sqrt(noise.variance)).any():
+    if noise.gain == 0 and not (level > full - MARGIN * math.sqrt(noise.variance)).any():
         return Levels(level, np.full(level.shape, noise.variance))
     variance = noise.variance + shot_noise(noise, level - noise.dark_level)
-    near = level > full - _MARGIN * np.sqrt(variance)
+    near = level > full - MARGIN * np.sqrt(variance)
     if not near.any():
         return Levels(level, variance)
-    sigma = np.sqrt(variance[near])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        below = np.where(sigma > 0, (full - level[near]) / sigma, np.copysign(np.inf, full - level[near]))
-    density = np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi)
-    capped = np.clip(below, -1e9, 1e9)
-    missing = capped * ndtr(below) + density  # mean of (full - x) / sigma where x is below, 0 elsewhere
-    square = (1 + capped**2) * ndtr(below) + capped * density
     level, variance = level.copy(), np.array(np.broadcast_to(variance, level.shape))
-    level[near], variance[near] = full - sigma * missing, sigma**2 * np.maximum(square - missing**2, 0.0)
+    level[near], variance[near] = cut_off(level[near], variance[near], full, ndtr)
     return Levels(level, variance)
 
 
@@ -88,12 +81,12 @@ def squared_errors(noise: Noise, level: np.ndarray, like: Levels) -> tuple[np.nd
         mean[quiet], variance[quiet] = _rounded(
             sigma[quiet], level[quiet], like.level[quiet], like.noise_variance[quiet]
         )
-    near = level > full - _MARGIN * sigma
+    near = level > full - MARGIN * sigma
     if not near.any():
         return mean, variance
     widest = float(sigma[near].max())
     cell = max(1.0, widest / 8)
-    values = full - cell * np.arange(np.ceil(2 * _MARGIN * widest / cell) + 2)
+    values = full - cell * np.arange(np.ceil(2 * MARGIN * widest / cell) + 2)
     below = ndtr((values - cell / 2 - level[near, None]) / sigma[near, None])
     probability = -np.diff(below, axis=1, prepend=1.0)
     squares = (values - like.level[near, None]) ** 2 / like.noise_variance[near, None]
@@ -126,5 +119,5 @@ def headroom(noise: Noise) -> float:
     room = full_scale(noise) - noise.dark_level
     if not np.isfinite(room):
         return np.inf
-    half = _MARGIN**2 * noise.shot_gain / 2
-    return float(room + half - np.sqrt(half * (half + 2 * room) + _MARGIN**2 * noise.variance))
+    half = MARGIN**2 * noise.shot_gain / 2
+    return float(room + half - np.sqrt(half * (half + 2 * room) + MARGIN**2 * noise.variance))

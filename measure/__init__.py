@@ -8,7 +8,7 @@ from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
 from measure.boards.dots import dot_grid
 from measure.bounds import bound
-from measure.correction import Correction, Images, correction
+from measure.correction import Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
 from measure.estimators.registry import best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
@@ -17,6 +17,7 @@ from measure.find.ellipse import find_ellipse
 from measure.find.search import find
 from measure.fitting.fit import fit
 from measure.fitting.result import Fit
+from measure.known_bias import Correction
 from measure.measurands import Measurements, corrected, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.blur_field import BlurredSides, FittedField, blurred_sides, fitted_field

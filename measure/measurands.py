@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from measure.correction import Correction
+from measure.covariances import of_measured, scaled
 from measure.estimators.registry import best_estimator
 from measure.features.forms import FoundForm
+from measure.known_bias import Correction
 from measure.measurement import Measurement, check_method, checked_image, of_first
 from measure.quantities import MeasuredFeatures, find
 from measure.saturation import saturated
@@ -189,14 +190,14 @@ def corrected(found: Measurements, correction: Correction, image: np.ndarray) ->
     states = np.array([correction.status_of(*each) for each in told]).reshape(shape)
     off, off_image = (np.nan_to_num(each).reshape(shape) for each in (off, off_image))
     doubtful, measured = np.isin(found.status, (status.CLUTTER, status.MISFIT)), np.isin(states, status.MEASURED)
-    spread = _scaled(found.covariance, correction.covariance, doubtful)
-    spread_image = _scaled(found.covariance_image, correction.covariance_image, doubtful)
+    spread = scaled(found.covariance, correction.covariance, doubtful)
+    spread_image = scaled(found.covariance_image, correction.covariance_image, doubtful)
     return replace(
         found,
         value=np.where(measured, found.value - off, np.nan),
         value_image=np.where(measured, found.value_image - off_image, np.nan),
-        covariance=_known(spread, measured),
-        covariance_image=_known(spread_image, measured),
+        covariance=of_measured(spread, measured),
+        covariance_image=of_measured(spread_image, measured),
         status=states,
         first=found.first and _first_corrected(found.first, off_image[..., 0], states[..., 0]),
         bias=off,
@@ -213,14 +214,6 @@ def _first_corrected(first: Measurement, bias: np.ndarray, states: np.ndarray) -
         bias_px=np.where(measured, bias, 0.0),
         status=states,
     )
-
-
-def _scaled(covariance: np.ndarray, propagated: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Covariances (..., M, M) with the marked variances replaced by propagated ones, correlations as they are."""
-    own, told = np.einsum("...mm->...m", covariance), np.diag(propagated)
-    usable = which & np.isfinite(own) & (own > 0) & np.isfinite(told)
-    factor = np.sqrt(np.divide(told, own, out=np.ones(own.shape), where=usable))
-    return covariance * factor[..., :, None] * factor[..., None, :]
 
 
 def measure_by(
@@ -251,8 +244,8 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         nominal=np.array(told, float),
         value_image=np.where(measured, found.image.value, np.nan).reshape(*lead, count),
         value=np.where(measured, found.plane.value, np.nan).reshape(*lead, count),
-        covariance_image=_known(found.image.covariance, measured).reshape(*lead, count, count),
-        covariance=_known(found.plane.covariance, measured).reshape(*lead, count, count),
+        covariance_image=of_measured(found.image.covariance, measured).reshape(*lead, count, count),
+        covariance=of_measured(found.plane.covariance, measured).reshape(*lead, count, count),
         status=found.status.reshape(*lead, count),
         p_value=found.shape.p_value.reshape(lead),
         first=of_first(found, picture, lead) if quantities[0].kind == "distance" else None,
@@ -263,9 +256,3 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         u_placed=np.sqrt(np.einsum("nmm->nm", found.placed)).reshape(*lead, count),
         forms={quantity.name: form.found for quantity, form in found.forms.items()},
     )
-
-
-def _known(covariance: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    both = measured[..., :, None] & measured[..., None, :]
-    lost = np.where(np.eye(measured.shape[-1], dtype=bool), np.inf, np.nan)
-    return np.where(both, covariance, lost)

@@ -15,6 +15,7 @@ from imaging.features.seen import Seen, unit_normals
 from imaging.geometry.lens import image_centre
 from imaging.models.extremes import extremes_of, with_extremes
 from imaging.pictures import Pictures
+from measure.covariances import spread
 from measure.features.corners import intersect
 from measure.features.forms import Forms, find_form
 from measure.features.found import MIN_SINE, Shape
@@ -76,7 +77,7 @@ class MeasuredFeatures:
             return found
         moved = np.einsum("nmk,nk->nm", self.adjustment.pulls(found.gradient), self.placement)
         gradient = self.adjustment.gradient(found.gradient)
-        return Values(found.value - moved, gradient, _spread(gradient, self.errors))
+        return Values(found.value - moved, gradient, spread(gradient, self.errors))
 
     @cached_property
     def at_known(self) -> Values:
@@ -148,7 +149,7 @@ class MeasuredFeatures:
             for k, move in point.moves.items():
                 rows[:, 2 * i : 2 * i + 2, k] = move
         corners = np.stack([point.at for point in points], 1) + image_centre(self.seen.camera)
-        return corners, _spread(rows, self.errors)
+        return corners, spread(rows, self.errors)
 
 
 def find(
@@ -209,13 +210,8 @@ def found_in_images(
         pair = [names.index(name) for name in corner.edges]
         corners[corner] = intersect(normals[:, pair], points[:, pair])[0] - image_centre(expected.camera)
     lengths = np.linalg.norm(expected.along, axis=-1)[:, None]
-    centres = np.broadcast_to(expected.centres, (count, *expected.centres.shape)).copy()
-    radii = np.broadcast_to(expected.radii, (count, *expected.radii.shape)).copy()
-    angles = np.broadcast_to(expected.half_angles, (count, *expected.half_angles.shape)).copy()
-    for c, (name, errors) in enumerate(zip(known.circles, circle_errors, strict=True)):
-        centres[:, c] += errors[:, :2] @ np.array(expected.sideways(expected.solid.round(name)))
-        radii[:, c] += errors[:, 2]
-        angles[:, c] += errors[:, 3:].sum(1)
+    sideways = [np.array(expected.sideways(expected.solid.round(name))) for name in known.circles]
+    moved = [errors[:, :2] @ axes for errors, axes in zip(circle_errors, sideways, strict=True)]
     return Seen(
         solid=expected.solid,
         camera=expected.camera,
@@ -225,12 +221,19 @@ def found_in_images(
         along=lengths * np.stack([normals[..., 1], -normals[..., 0]], -1),
         corners=corners,
         circles=known.circles,
-        centres=centres,
-        radii=radii,
-        half_angles=angles,
+        centres=_added(expected.centres, moved, count),
+        radii=_added(expected.radii, [errors[:, 2] for errors in circle_errors], count),
+        half_angles=_added(expected.half_angles, [errors[:, 3:].sum(1) for errors in circle_errors], count),
         expected=False,
         forms=forms,
     )
+
+
+def _added(expected: np.ndarray, moved: list[np.ndarray], count: int) -> np.ndarray:
+    """Expected numbers (C, ...) of circles with what each is moved by in n images, (n, ...)."""
+    if not moved:
+        return np.broadcast_to(expected, (count, *expected.shape))
+    return expected + np.stack(moved, 1)
 
 
 def values(seen: Seen, quantities: tuple[Quantity, ...], kind, errors: np.ndarray) -> Values:
@@ -240,22 +243,11 @@ def values(seen: Seen, quantities: tuple[Quantity, ...], kind, errors: np.ndarra
         found: list[Evaluated] = [kind(seen, quantity) for quantity in quantities]
         gradient = dense(found, (count,), seen.count)
         value = np.stack([np.broadcast_to(each.value, count) for each in found], -1)
-        covariance = _spread(gradient, errors)
+        covariance = spread(gradient, errors)
         if any(True for _ in extremes_of(quantities)):
             each = [with_extremes(quantities, *one) for one in zip(value, gradient, covariance, strict=True)]
             gradient, covariance = (np.array(part) for part in zip(*each, strict=True))
         return Values(value, gradient, covariance)
-
-
-def _spread(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Covariance (n, k, k) of what moves by rows (n, k, q); NaN where it depends on what is not found."""
-    lost = ~np.isfinite(np.einsum("nqq->nq", errors))
-    whole = np.where(lost[:, :, None] | lost[:, None, :], 0.0, errors)
-    used = np.where((rows == 0) | lost[:, None], 0.0, rows)
-    spread = used @ whole @ np.swapaxes(used, -1, -2)
-    spread = (spread + np.swapaxes(spread, -1, -2)) / 2  # a product's rounding is not symmetric
-    missing = ((rows != 0) & lost[:, None]).any(-1)
-    return np.where(missing[:, :, None] | missing[:, None, :], np.nan, spread)
 
 
 def _errors(shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Forms], seen: Seen) -> np.ndarray:

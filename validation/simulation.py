@@ -28,7 +28,7 @@ from imaging.light.appearance import is_plain
 from imaging.models.bias import bias
 from imaging.pictures import Pictures
 from measure import Correction, Images
-from measure.correction import RENDERING, TEXTURE
+from measure.known_bias import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from measure.unevenness import Unevenness
 from render import EffectTolerance, Quality

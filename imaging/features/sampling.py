@@ -59,7 +59,16 @@ def line_through(sine, cosine, periods, length) -> tuple[np.ndarray, np.ndarray]
 
 def sampled_places(places: np.ndarray, normals: np.ndarray, blur_px, scale: float) -> np.ndarray:
     """Shift (...) along unit normals (..., 2), px, of a lone edge's crossing at places (..., 2), px."""
-    amplitude = _amplitude(normals @ _ORDERS.T, blur_px, scale)
+    return shifted_by(amplitudes(normals, blur_px, scale), places)
+
+
+def amplitudes(normals: np.ndarray, blur_px, scale: float) -> np.ndarray:
+    """The largest shifts (..., 2) along unit normals (..., 2), px, by each order of sampling."""
+    return _amplitude(normals @ _ORDERS.T, blur_px, scale)
+
+
+def shifted_by(amplitude: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Shifts (...), px, at places (..., 2), px, of these amplitudes."""
     return (amplitude * np.sin(2 * np.pi * places @ _ORDERS.T)).sum(-1)
 
 

@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from imaging.features.locator import edge_blur
-from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
+from measure.estimators.crossing import CrossingLocator, in_rows, reached
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.separate import SeparateEstimator, by_points, calipers_for, thinned
+from measure.estimators.windows import places_across, second_derivatives, slope_to_contrast
 from measure.features.calipers import Caliper
 from measure.features.layout import Layout
 from measure.features.optics import Optics
@@ -33,31 +33,19 @@ def gradient_along(
     offsets, across, toward = places_across(places, normals, optics.window_px)
     pixels, kernel = reached(second_derivative(across, toward, optics.scale_px, optics.shape))
     blur = optics.blur_at(places) if blur is None else blur
-    total = np.hypot(optics.scale_px, edge_blur(blur)) * np.ones(len(places))
+    per_slope, one = slope_to_contrast(optics.scale_px, blur), np.ones(len(places))
     nothing = np.zeros((len(places), 0)), np.zeros((0, pixels.size))
     return CrossingLocator(
-        positions, offsets, pixels, kernel, np.sqrt(2 * np.pi) * total**3, gain * np.ones(len(places)),
-        *nothing, signs, optics=optics,
+        positions, offsets, pixels, kernel, per_slope * one, gain * one, *nothing, signs, optics=optics, places=places,
+        normals=normals,
     )  # fmt: skip
 
 
 def second_derivative(
     places: np.ndarray, normals: np.ndarray, scale: float, shape: tuple[int, int]
 ) -> sparse.csr_array:
-    """Rows that take the Gaussian second derivative of an image at places (M, 2) along unit normals (M, 2), px.
-
-    The sampled kernel is corrected to sum to exactly zero, so that a constant image gives 0.
-    """
-
-    def derive(gauss: np.ndarray, dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
-        across = dx * normals[:, 0, None, None] + dy * normals[:, 1, None, None]
-        across *= across
-        mean = np.einsum("nij,nij->n", gauss, across) / gauss.sum((1, 2))
-        across -= mean[:, None, None]
-        across *= gauss
-        return across / scale**4
-
-    return gaussian_rows(places, scale, shape, derive)
+    """Rows that take the Gaussian second derivative of an image at places (M, 2) along unit normals (M, 2), px."""
+    return in_rows(*second_derivatives(places, normals, scale), shape)
 
 
 def _prepared(layout: Layout, threshold: float) -> SeparateEstimator:

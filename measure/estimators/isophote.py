@@ -17,10 +17,11 @@ import numpy as np
 from imaging.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
 from imaging.geometry.segments import distance_to_segment
 from measure.estimators.beside import SideLevel, misled
-from measure.estimators.crossing import CrossingLocator, gaussian_rows, places_across, reached
+from measure.estimators.crossing import CrossingLocator, gaussian_rows, reached
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.separate import PointEstimator, SeparateEstimator, calipers_for, measurable, thinned
 from measure.estimators.strip import HALF_WIDTH, pixels_beside
+from measure.estimators.windows import places_across
 from measure.features.calipers import Caliper
 from measure.features.layout import BACKGROUND, Layout
 from scenes import status

@@ -16,18 +16,23 @@ from measure.estimators.estimate import Estimate, noisy
 from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout, Optics
-from measure.features.lines import fit_lines, regression, trapezoid
-from measure.features.points import DECIDED, EdgePoints
+from measure.features.lines import (
+    by_noise,
+    fit_lines,
+    inverse_contrast,
+    level_and_slope,
+    line_map,
+    line_state,
+    trapezoid,
+)
+from measure.features.points import EdgePoints
 from measure.features.rim_noise import Drawn, drawn, is_linear
 from scenes import status
 
 if TYPE_CHECKING:
     from measure.estimators.canny import CannyLocator
 
-_MIN_FOUND = 0.5  # part of an edge's positions at which a point must be found
 _WHOLE = 0.9  # of what a point would count, above which it is certain
-_DIMMEST = 0.1  # contrast at an end over that in the middle, below which it is no straight line any more
-_MAX_SCATTER = 0.8  # px; in noise alone points scatter by 0.9 to 1.5 (window 3 px), on the weakest edges by 0.3
 
 
 def calipers_for(layout: Layout, kernel_sigmas: float, trim: float | None = None) -> tuple[Caliper, ...]:
@@ -83,27 +88,15 @@ class PointEstimator:
         """As `Estimator.estimate`; ``noise_variance`` (n,) is the mean along the edge, grey levels^2."""
         points = self.locator.locate(images)
         lines = fit_lines(points, points.weights)
-        slope = np.tan(lines.tilt)
-        enough = points.valid.sum(1) >= np.maximum(_MIN_FOUND * self.caliper.positions.size, 3)
-        clear = points.contrast > self.locator.least_contrast * np.sqrt(noise_variance)
-        edge = enough & clear & points.sure & (lines.scatter < _MAX_SCATTER)
-        one = np.where(points.certain >= DECIDED, status.OK, status.ILL_CONDITIONED)
-        state = np.where(points.reversed, status.SIGN_CHANGE, np.where(edge, one, status.LOW_CONTRAST))
-        columns = (
-            lines.mean_offset - slope * lines.mean_along,
-            slope,
-            np.stack([points.contrast - points.trend * lines.mean_along, points.trend], -1),
-            lines.count,
-            np.maximum(self.caliper.positions.size - lines.count, 0),
-            state,
-        )
+        level, slope, contrast = level_and_slope(points, lines)
+        size = self.caliper.positions.size
+        state = line_state(points, lines, size, self.locator.least_contrast, noise_variance)
+        columns = level, slope, contrast, lines.count, np.maximum(size - lines.count, 0), state
         return Estimate(*(column[:, None] for column in columns))
 
     def covariance(self, estimate: Estimate, images: np.ndarray) -> np.ndarray:
         """That of a straight edge whose points' errors go with 1 / contrast, a parabola through three places."""
-        contrast = estimate.contrast[..., :1] + estimate.contrast[..., 1:] * self._places
-        middle = contrast[:, 0, 1:2]
-        inverse = 1 / np.where(middle > 0, np.maximum(contrast[:, 0], _DIMMEST * middle), np.nan)
+        inverse = inverse_contrast(estimate.contrast[:, 0], self._places)
         moments = noisy(self._responses, self.caliper.optics, images, self.pixels)
         shape = (len(inverse) if moments.ndim == 3 else 1, 2, 3, 2, 3)
         moments = np.broadcast_to(moments.reshape(shape), (len(inverse), *shape[1:]))
@@ -118,9 +111,7 @@ class PointEstimator:
     def _responses(self) -> np.ndarray:
         """Derivative of (level, slope) by `pixels` where 1 / contrast is 1 at one of `_places`, 0 at others, (6, P)."""
         noise = self.locator.unit_noise()
-        lines = _level_and_slope(noise.along, noise.weights)
-        shapes = np.linalg.inv(np.vander(self._places, 3)).T @ np.vander(noise.along, 3).T
-        return (lines[:, None] * shapes).reshape(6, -1) @ noise.response
+        return by_noise(noise.along, noise.weights, self._places) @ noise.response
 
     def respond_within(self, clean: np.ndarray, pixels: np.ndarray, *, asked: bool = False) -> np.ndarray:
         """Derivative of (level, slope) by some pixels, flat indices in order that hold all of `pixels`, (2, P).
@@ -174,14 +165,8 @@ class PointEstimator:
             nothing = np.full(pixels.size, np.nan), pixels, np.arange(3) * len(self.pixels)
             return points, sparse.csr_array(nothing, (2, clean.size))
         weights = np.broadcast_to(points.weights, points.along.shape)[0, keep]
-        lines = _level_and_slope(points.along[0, keep], weights)
+        lines = line_map(points.along[0, keep], weights)
         return points, sparse.csr_array(lines) @ sparse.csr_array(response)[np.flatnonzero(keep)]
-
-
-def _level_and_slope(along: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Linear map from offsets at places (m,) to (offset at the start of the edge, slope), (2, m)."""
-    mean, slope = regression(along, weights)
-    return np.stack([mean - (weights @ along) / weights.sum() * slope, slope])
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 from scipy.ndimage import gaussian_filter1d
 
+from measure.features.aligned import Aligned
 from measure.features.layout import Layout
 from measure.once import once
 
@@ -20,25 +20,25 @@ def align(images: np.ndarray, layout: Layout) -> np.ndarray:
 
     Multiples of 0.5 px and 0.5 degrees: good enough for any estimator to start from.
     """
-    matrix, centres = _profiles(layout)
-    profiles = (matrix @ images.reshape(len(images), -1).T).reshape(len(centres), -1, len(images))
-    rise = np.abs(gaussian_filter1d(profiles, 1.0 / _STEP, axis=1, order=1))
-    candidates, places = _candidates(layout, centres)
-    score = np.zeros((len(candidates), len(images)))
-    for piece, place in zip(rise, places.T, strict=True):
-        score += piece[place]
-    return candidates[score.argmax(0)]
+    return aligned(layout).poses(images.reshape(len(images), -1))
 
 
 @once
-def _profiles(layout: Layout) -> tuple[sparse.csr_array, np.ndarray]:
-    """Matrix (pieces * places, pixels) that averages the image along pieces of the edges at places across them.
+def aligned(layout: Layout) -> Aligned:
+    """What finds a layout."""
+    pixels, centres = _pieces(layout)
+    slope = gaussian_filter1d(np.eye(pixels.shape[1]), 1.0 / _STEP, axis=0, order=1)
+    return Aligned(pixels, slope, *_candidates(layout, centres))
+
+
+def _pieces(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels (pieces, places, 12) along pieces of the edges at places across them.
 
     Second result: (edge, place along it) of each piece's centre.
     """
     height, width = layout.optics.shape
     across = np.arange(-SEARCH - 3, SEARCH + 3 + _STEP / 2, _STEP)
-    blocks, centres = [], []
+    pieces, centres = [], []
     for e, (start, stop) in enumerate(layout.ends):
         length = np.linalg.norm(stop - start)
         for part in range(_PARTS):
@@ -46,13 +46,9 @@ def _profiles(layout: Layout) -> tuple[sparse.csr_array, np.ndarray]:
             points = start + along[:, None] * layout.directions[e]
             places = points[None] + across[:, None, None] * layout.normals[e]
             pixel = np.rint(places).astype(int)
-            flat = np.clip(pixel[..., 1], 0, height - 1) * width + np.clip(pixel[..., 0], 0, width - 1)
-            rows = np.repeat(np.arange(across.size), along.size)
-            blocks.append(
-                sparse.csr_array((np.full(flat.size, 1 / 12), (rows, flat.ravel())), (across.size, height * width))
-            )
+            pieces.append(np.clip(pixel[..., 1], 0, height - 1) * width + np.clip(pixel[..., 0], 0, width - 1))
             centres.append((e, along.mean()))
-    return sparse.vstack(blocks, format="csr"), np.array(centres)
+    return np.array(pieces), np.array(centres)
 
 
 def _candidates(layout: Layout, centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

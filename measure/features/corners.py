@@ -18,7 +18,7 @@ def line_equations(
         np.stack([getattr(f, name) for f in calipers]) for name in ("normal", "direction", "origin")
     )
     tilted = normals - slope[..., None] * directions
-    return tilted / np.hypot(1, slope)[..., None], origins + level[..., None] * normals
+    return tilted / np.hypot(slope, 1.0)[..., None], origins + level[..., None] * normals
 
 
 def intersect(normals: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

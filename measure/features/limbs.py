@@ -36,7 +36,8 @@ def limb_tool(picture: Picture, nominal: Curved, moved: tuple[float, ...]) -> Ri
     crossings = np.nan_to_num(outline.at) - inward[:, None] * normals  # a pixel may lie between
     places, none = held(crossings + image_centre(scene.camera), optics), np.zeros(len(keep))
     locator = gradient_along(optics, np.arange(float(len(weight)))[keep], places[keep], normals[keep])
-    return RimTool(locator, np.nan_to_num(outline.design)[keep], weight[keep], none, state, optics, places[keep])
+    design = np.nan_to_num(outline.design)[keep]
+    return RimTool(design, weight[keep], none, state, optics, locator=locator, places=places[keep])
 
 
 def _weights(pictures: Pictures, curved: Curved, outline: LimbOutline, seen: LimbLook | None) -> tuple[np.ndarray, str]:

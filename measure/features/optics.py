@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imaging.colour import by_raw, raw_variance
+from imaging.features.demosaiced import place_shifts
 from imaging.geometry.blur import blur_times
 from imaging.geometry.lens import lens_jacobian, recorded, undistorted
 from imaging.row_noise import shared
@@ -147,6 +148,10 @@ class Optics:
         own = np.broadcast_to(known, (*variance.shape[:-1], len(known)))
         sums = (rows.reshape(-1, len(pixels)) @ parts).reshape(*rows.shape[:-1], len(known))
         return np.concatenate([rows, sums], -1), np.atleast_2d(np.concatenate([variance, own], -1))
+
+    def mixed_at(self, places: np.ndarray, normals: np.ndarray) -> np.ndarray | float:
+        """How far demosaicing moves crossings at recorded places (..., 2) along unit normals there, px."""
+        return place_shifts(self.colour, places, normals, self.blur_px, self.scale_px)
 
     def has_room(self, places: np.ndarray) -> np.ndarray:
         """Whether a locator that stands at places (m, 2) looks at the image alone, bool (m,)."""

@@ -20,21 +20,18 @@ from imaging.features.rim_sides import clearance, outward_normals, seen_along, w
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
-from measure.estimators.crossing import EachPoint
 from measure.estimators.gradient import gradient_along
 from measure.features.limbs import limb_tool
 from measure.features.optics import Optics
+from measure.features.points import EachPoint
+from measure.features.rim_fit import Curve
 from measure.features.rim_noise import Drawn, Stack, drawn, is_linear
-from measure.features.tools import Curve, RimTool, held
+from measure.features.tools import RimTool, held
 from scenes import Circle, Curved, Picture, status
 
 _FINER = 3  # times as many on an arc
-_MIN_FOUND = 0.7  # part of the places taken at which a point must be found
-_MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
-_CAPTURE = 1.0  # px from the expected rim up to which the points are as good as on it
 _GRID = 0.25  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
-_SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +66,8 @@ def circle_response(clean: np.ndarray, picture: Picture, name: str) -> sparse.cs
     for _ in range(_PASSES):
         tool = rim_tool(picture, name, moved)
         points, response = tool.locator.respond_each(clean)
-        fit, errors, used = _fitted(tool, points)
-        if not _is_far(tool, errors)[0]:
+        fit, errors, used = tool.fitted(points)
+        if not tool.is_far(errors)[0]:
             break
         moved = _rounded(tool, np.array(moved) + errors[0])
     taken = used[0] & (tool.weights > 0)
@@ -109,7 +106,7 @@ def nearest_tools(picture: Picture, name: str, found: Circles) -> list[tuple[Rim
             continue
         moved = unmoved(picture, name)
         tool = rim_tool(picture, name, moved)
-        if _is_far(tool, errors[None])[0]:
+        if tool.is_far(errors[None])[0]:
             moved = _rounded(tool, errors)
             tool = rim_tool(picture, name, moved)
         tools.append((tool, np.array(moved), errors - np.array(moved)))
@@ -126,7 +123,7 @@ def _find(images: Stack | Drawn, picture: Picture, name: str, moved: tuple[float
     tool = rim_tool(picture, name, moved)
     found = _measured(images, tool)
     found = replace(found, errors=found.errors + np.array(moved))
-    far = found.near & _is_far(tool, found.errors - np.array(moved))
+    far = found.near & tool.is_far(found.errors - np.array(moved))
     if not far.any():
         return found
     if passes == 0:
@@ -151,44 +148,16 @@ def _measured(images: Stack | Drawn, tool: RimTool) -> Circles:
         )
     used = images.at(tool.locator.pixels)
     points = tool.locator.locate_each_in(used)
-    taken = tool.weights > 0
-    fit, errors, _ = _fitted(tool, points)
-    clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(tool.optics.noise_variance)
-    part = (points.valid & clear)[:, taken].sum(1) / max(taken.sum(), 1)
-    determined = np.isfinite(errors).all(1)
-    state = np.where(part >= _MIN_FOUND, tool.state, status.LOW_CONTRAST)
-    state = np.where(determined, state, status.ILL_CONDITIONED)
-    return Circles(errors, _covariance(used, tool, fit, points), state, determined & (part >= _MIN_NEAR))
+    fit, errors, _ = tool.fitted(points)
+    return Circles(errors, _covariance(used, tool, fit, points), *tool.states(points, errors))
 
 
-def _fitted(tool: RimTool, points: EachPoint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least-squares maps (n, p, m), errors (n, p) and the places (n, m) that they are from: of a circle about where it
-    is expected those that show what is expected of them."""
-    fit = tool.fit(points.valid)
-    errors = tool.solve(fit, points.offset)
-    near = ~_is_far(tool, errors)[:, None]
-    used = np.where(near, tool.as_expected(points.valid, points.contrast), points.valid)
-    if (used != points.valid).any():
-        fit = tool.fit(used)
-        errors = tool.solve(fit, points.offset)
-    return fit, errors, used
-
-
-def _covariance(used: np.ndarray, tool: RimTool, fit: np.ndarray, points) -> np.ndarray:
+def _covariance(used: np.ndarray, tool: RimTool, fit: np.ndarray, points: EachPoint) -> np.ndarray:
     """Covariance (n, p, p) at the contrast that images of pixels (n, P) show each."""
-    contrast = np.where(points.valid, points.contrast, 0.0)
-    number = np.convolve(np.ones(contrast.shape[1]), np.ones(_SMOOTH), "same")
-    smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
-    inverse = np.where(tool.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
-    rows = np.nan_to_num(fit * inverse[:, None]).reshape(-1, fit.shape[-1]) @ tool.response
+    rows = tool.noise_rows(fit, points).reshape(-1, fit.shape[-1]) @ tool.response
     rows, variance = tool.optics.independent(rows.reshape(len(used), fit.shape[1], -1), tool.locator.pixels, used)
     variance = variance if isinstance(variance, float) else variance[:, None]
     return np.einsum("nip,njp->nij", rows * variance, rows)
-
-
-def _is_far(tool: RimTool, errors: np.ndarray) -> np.ndarray:
-    """Whether circles with errors (n, p) are farther from the expected one than the locator captures, bool (n,)."""
-    return np.abs(np.nan_to_num(errors) @ tool.design.T).max(-1) > _CAPTURE
 
 
 def _rounded(tool: RimTool, errors: np.ndarray) -> tuple[float, ...]:
@@ -233,7 +202,8 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     told = None if seen is None else np.sqrt(seen.squared)[keep]
     signs = None if seen is None else np.where(seen.brightens, 1.0, -1.0)[keep]
     locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain, signs=signs)
-    return RimTool(locator, design[keep], weight[keep], inward[keep], state, optics, curve.places, curve, told)
+    return RimTool(design[keep], weight[keep], inward[keep], state, optics, curve, told, locator=locator,
+                   places=curve.places)  # fmt: skip
 
 
 def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:

@@ -19,6 +19,7 @@ from measure.features.arranged import find_arranged, goodness
 from measure.features.corners import corner_response, intersect, line_equations
 from measure.features.found import MIN_SINE, Shape, gather, nothing
 from measure.features.layout import Layout
+from measure.features.lines import at_ends, capture, edge_states, end_errors
 from measure.goodness import WORST
 from scenes import status
 
@@ -90,7 +91,7 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
     if any(caliper.status not in status.MEASURED for caliper in calipers):
         return shape
     offsets, errors = _at_ends(tool, estimate, lines)
-    far = ~(np.abs(offsets) <= _capture(name, errors)).all((1, 2))
+    far = ~(np.abs(offsets) <= capture(ESTIMATORS[name].capture_px, errors)).all((1, 2))
     lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
     if not far.any() or passes == 0:
         return _refuse(shape, far)
@@ -114,7 +115,9 @@ def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float) -> np.n
     estimate = tool.estimate(images)
     offsets, errors = _at_ends(tool, estimate, tool.covariance(estimate, images))
     with np.errstate(divide="ignore", invalid="ignore"):
-        beyond = ndtr(-np.abs(np.abs(offsets) - _capture(name, errors)) / errors)  # or within, of those that are beyond
+        beyond = ndtr(
+            -np.abs(np.abs(offsets) - capture(ESTIMATORS[name].capture_px, errors)) / errors
+        )  # or within, of those that are beyond
         chance = 1 - np.prod(1 - np.nan_to_num(beyond))
     if chance < _RARE or any(caliper.status not in status.MEASURED for caliper in tool.calipers):
         return np.zeros(len(layout.names), bool)
@@ -129,13 +132,7 @@ def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float) -> np.n
 def _at_ends(tool: Estimator, estimate: Estimate, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How far each line lies from its expected edge at both ends, px, and standard deviations, (n, E, 2) each."""
     lengths = np.array([caliper.length for caliper in tool.calipers])
-    offsets = np.stack([estimate.level, estimate.level + estimate.slope * lengths], -1)
-    return offsets, _end_errors(lines, lengths)
-
-
-def _capture(name: str, errors: np.ndarray) -> np.ndarray:
-    """Up to which offsets lines are taken from where they are expected, (n, E, 2)."""
-    return np.maximum(ESTIMATORS[name].capture_px, 5 * errors)
+    return at_ends(estimate.level, estimate.slope, lengths), end_errors(lines, lengths)
 
 
 def _expectations(images, layout, offsets, far, lost, first):
@@ -153,12 +150,6 @@ def _expectations(images, layout, offsets, far, lost, first):
         yield _shifted(layout, tuple(key.ravel().tolist())), which[(keys == key).all((1, 2))]
 
 
-def _end_errors(covariance: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Standard deviation of each line's offset at its two ends, px, (n, E, 2), from the lines' covariance."""
-    a, b, ab = (np.einsum("nee->ne", covariance[:, i::2, j::2]) for i, j in ((0, 0), (1, 1), (0, 1)))
-    return np.nan_to_num(np.sqrt(np.stack([a, a + 2 * lengths * ab + lengths**2 * b], -1)))
-
-
 def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.ndarray) -> Shape:
     """Corners from lines with covariance ``lines`` (n, 2 E, 2 E)."""
     calipers = tool.calipers
@@ -166,9 +157,7 @@ def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.nda
     crossings = [intersect(normals[:, list(pair)], points[:, list(pair)]) for pair in layout.corners]
     corners = np.stack([c for c, _ in crossings], 1) if crossings else np.empty((len(normals), 0, 2))
     sines = np.stack([s for _, s in crossings], 1) if crossings else np.empty((len(normals), 0))
-    fixed = np.array([caliper.status for caliper in calipers])
-    edge_status = np.where(fixed == status.OK, estimate.state, np.where(
-        (fixed == status.CLUTTER) & (estimate.state != status.OK), estimate.state, fixed))  # fmt: skip
+    edge_status = edge_states(np.array([caliper.status for caliper in calipers]), estimate.state)
     joint = np.where(sines < MIN_SINE, status.ILL_CONDITIONED, status.OK)
     state = np.array([status.worst(*row) for row in np.concatenate([edge_status, joint], 1)])
     measured = np.isin(state, status.MEASURED)

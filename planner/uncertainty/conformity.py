@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from typing import Literal
-
+from planner.uncertainty.rule import Decision, decided
 from scenes import InvalidInput, Tolerance
-from scenes.status import OK, is_trusted
+from scenes.status import OK
 
 COVERAGE = 2.0  # k: the expanded uncertainty U = k sigma covers about 95 % of a normal distribution
-Decision = Literal["pass", "fail", "undecided"]
 
 
 def decide(
@@ -44,9 +41,4 @@ def decide(
     """
     if not k >= 0:
         raise InvalidInput(f"k must be at least 0, got {k}")
-    if not (is_trusted(status) and math.isfinite(value) and math.isfinite(sigma)):
-        return "undecided"
-    inside = min(value - (nominal - tolerance.minus), nominal + tolerance.plus - value)
-    if inside >= k * sigma:
-        return "pass"
-    return "fail" if inside < -k * sigma else "undecided"
+    return decided(value, (nominal - tolerance.minus, nominal + tolerance.plus), k * sigma, status)

@@ -49,6 +49,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "msa": ("calibrated_rig",),
     "catalogue": ("check", "parts.toml"),
     "design": ("calibrated_rig", "--catalogue", "parts.toml", "--own-light", "--lens-blur", "2"),
+    "export": ("small.toml", *POSES, "-o", "recipe"),
     "dossier": ("rig.toml", "--renders", "20", "--stations", "50", "--tables", "100", "--exposures", "20", "--no-hard"),
     "cost": ("small.toml", "--budget", "1s", "--out", "cost"),
     "explore": ("small.toml",),

@@ -24,7 +24,7 @@ from scipy import stats
 import measure
 import render
 import scenes
-from measure.correction import RENDERING
+from measure.known_bias import RENDERING
 from scenes import Picture, Pose, Scene, StatisticalTexture
 from scenes.status import is_trusted
 from validation import simulation

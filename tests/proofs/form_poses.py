@@ -21,7 +21,7 @@ from scipy import stats
 
 import measure
 import render
-from measure.correction import RENDERING
+from measure.known_bias import RENDERING
 from scenes import Picture, Pose, Scene
 from scenes.status import is_trusted
 from tests import toleranced

@@ -21,7 +21,7 @@ from scipy import stats
 
 import measure
 import render
-from measure.correction import RENDERING
+from measure.known_bias import RENDERING
 from planner.uncertainty.zones import ZoneSize
 from scenes import Picture, Pose, Scene
 from scenes.status import is_trusted

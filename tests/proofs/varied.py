@@ -24,7 +24,7 @@ import scenes
 from imaging.features.measurand import measurands
 from imaging.pictures import Pictures
 from measure import Images
-from measure.correction import RENDERING
+from measure.known_bias import RENDERING
 from render import Quality
 from scenes import InvalidInput, Picture, Scene
 from scenes.status import is_trusted

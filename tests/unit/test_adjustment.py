@@ -6,7 +6,8 @@ from scipy.ndimage import gaussian_filter
 
 import measure.adjustment as adjustments
 import scenes
-from measure.adjustment import Adjusted, Adjustment
+from measure import adjusting
+from measure.adjustment import Adjusted
 from scenes import Picture
 
 SIGMA, ROWS, COLUMNS = 2.0, 240, 256
@@ -61,13 +62,13 @@ def _pulls(adjustment, rng, count, faces=0.0, blotches=0.0):
 
 def test_errors_of_inputs_are_as_told(picture):
     rng = np.random.default_rng(1)
-    adjustment = Adjustment.of(_sets(CHANGES, rng, level=0.5, alike=0.1), picture)
+    adjustment = adjusting.adjustment(_sets(CHANGES, rng, level=0.5, alike=0.1), picture)
     told = np.sqrt(np.diag(adjustment.covariance))
     assert (told < 0.7).all()
     assert (told > 0.12).all()
     pulls = _pulls(adjustment, rng, 150)
     assert np.sqrt((pulls**2).mean(0)) == pytest.approx(np.ones(3), abs=0.2)  # 0.06 by chance
-    noisy = Adjustment.of(_sets(CHANGES, rng, level=0.5, alike=1.0), picture)  # its columns are mostly noise
+    noisy = adjusting.adjustment(_sets(CHANGES, rng, level=0.5, alike=1.0), picture)  # its columns are mostly noise
     pulls_of_noisy = _pulls(noisy, rng, 80)
     assert np.sqrt((pulls_of_noisy**2).mean(0)).max() < 1.8  # 1.4: their noise is the same in all pictures
     assert (np.sqrt(np.diag(noisy.covariance)) < 0.8).any()
@@ -79,15 +80,15 @@ def test_noise_of_rays_tells_nothing(picture):
     """Of two sets it does not agree with itself; one set alone would claim to know all inputs."""
     rng = np.random.default_rng(2)
     sets = _sets(np.zeros_like(CHANGES), rng, alike=3.0)
-    told = np.sqrt(np.diag(Adjustment.of(sets, picture).covariance))
+    told = np.sqrt(np.diag(adjusting.adjustment(sets, picture).covariance))
     assert (told > 0.9).all()
     same = np.array([sets[0], sets[0]])
-    assert (np.sqrt(np.diag(Adjustment.of(same, picture).covariance)) < 0.5).all()  # negative control
+    assert (np.sqrt(np.diag(adjusting.adjustment(same, picture).covariance)) < 0.5).all()  # negative control
 
 
 def test_faces_that_reflect_otherwise_tell_nothing_wrong(picture):
     rng = np.random.default_rng(3)
-    adjustment = Adjustment.of(_sets(CHANGES, rng), picture)
+    adjustment = adjusting.adjustment(_sets(CHANGES, rng), picture)
     pulls = _pulls(adjustment, rng, 80, faces=0.05)
     assert np.sqrt((pulls**2).mean(0)).max() < 1.3
 
@@ -95,7 +96,7 @@ def test_faces_that_reflect_otherwise_tell_nothing_wrong(picture):
 def test_a_model_that_does_not_fit_is_believed_less(picture):
     """Blotches of one per cent do as much as the inputs."""
     rng = np.random.default_rng(5)
-    adjustment = Adjustment.of(_sets(CHANGES, rng), picture)
+    adjustment = adjusting.adjustment(_sets(CHANGES, rng), picture)
     pulls = _pulls(adjustment, rng, 60, blotches=0.01)
     sure = np.sqrt(np.diag(adjustment.covariance))
     _, covariance = adjustment.inputs(BASE + (BASE - 16) * _blotches(rng, 0.01))
@@ -107,11 +108,11 @@ def test_a_model_that_does_not_fit_is_believed_less(picture):
 
 def test_what_shows_edges_only_tells_nothing(picture):
     busy = BASE + 60 * ((X // 6 + Y // 6) % 2)
-    assert Adjustment.of(np.array([[busy] * 4] * 2), picture) is None
+    assert adjusting.adjustment(np.array([[busy] * 4] * 2), picture) is None
 
 
 def test_sources_add_up_to_the_joint_uncertainty(picture):
-    adjustment = Adjustment.of(_sets(CHANGES, np.random.default_rng(4)), picture)
+    adjustment = adjusting.adjustment(_sets(CHANGES, np.random.default_rng(4)), picture)
     moved = np.array([[0.3, 0.0, 1.0], [0.1, 0.0, -1.0], [0.2, 0.0, np.nan]])
     told = Adjusted(adjustment, ("reflectance", "light_place", "light_place"), moved, moved).sources(moved)
     joint = np.einsum("im,ij,jm->m", moved, adjustment.covariance, moved)
@@ -122,5 +123,5 @@ def test_sources_add_up_to_the_joint_uncertainty(picture):
 
 def test_no_input_is_known_better_than_a_multiple_of_its_step(picture, monkeypatch):
     monkeypatch.setattr(adjustments, "_LINEAR", 0.3)
-    covariance = Adjustment.of(_sets(10 * CHANGES, np.random.default_rng(6)), picture).covariance
+    covariance = adjusting.adjustment(_sets(10 * CHANGES, np.random.default_rng(6)), picture).covariance
     assert np.sqrt(np.diag(covariance)) == pytest.approx(np.full(3, 0.3), abs=0.02)

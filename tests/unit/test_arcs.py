@@ -15,8 +15,8 @@ from imaging.features.rim_look import look
 from imaging.features.rim_sides import within_ends
 from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
+from measure.features.rim_fit import Curve
 from measure.features.rims import find_circle
-from measure.features.tools import Curve
 from scenes import Picture
 from scenes.measurands.proposed import proposed
 from scenes.parts import mesh

@@ -12,7 +12,7 @@ from imaging.features import limb_look, rim_look, rim_sides
 from imaging.features.rim_look import RimLook
 from imaging.features.rim_outline import _crossed, zero_of_steps
 from imaging.pictures import Pictures
-from measure.features.tools import RimTool
+from measure.features.rim_fit import RimFit
 from scenes import Circle
 from scenes.viewpoint import Viewpoint
 
@@ -188,7 +188,7 @@ def test_a_limbs_places_near_an_edge_that_is_seen(monkeypatch):
 def test_places_that_show_less_than_half_their_contrast_are_left_out_whatever_the_light():
     """Beside the middle of those that are valid and weigh; of a light a tenth as bright the same."""
     told, weights = np.array([40.0, 40, 40, 40, 20, 20, 20]), np.array([1.0, 1, 1, 1, 1, 1, 0])
-    tool = RimTool(None, np.ones((7, 3)), weights, np.zeros(7), "ok", None, np.zeros((7, 2)), contrast=told)
+    tool = RimFit(np.ones((7, 3)), weights, np.zeros(7), "ok", None, contrast=told)
     bright = np.array([40.0, 40, 40, 19, 20, -2, 0])
     shown = np.stack([bright, bright / 10, told / 40])
     valid = np.array([[1] * 7, [0] + [1] * 6, [1] * 7], bool)

@@ -8,7 +8,7 @@ import pytest
 import scenes
 from measure.features.arranged import _nothing, line_rows
 from measure.features.layout import layout_of
-from measure.features.shape import _end_errors
+from measure.features.lines import end_errors
 from scenes import Picture, Pose, status
 
 
@@ -17,7 +17,7 @@ def test_errors_at_both_ends(rng):
     lengths = np.array([40.0, 7.0])
     roots = rng.normal(size=(3, 4, 4)) * [1, 0.1, 1, 0.1]
     covariance = roots.swapaxes(-1, -2) @ roots
-    found = _end_errors(covariance, lengths)
+    found = end_errors(covariance, lengths)
     for e, length in enumerate(lengths):
         for end, place in enumerate((0.0, length)):
             row = np.zeros(4)

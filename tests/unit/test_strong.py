@@ -14,7 +14,7 @@ from imaging.light.appearance import side_signals
 from imaging.models.along import used_trims
 from imaging.models.strong import strong_piece, strong_pieces
 from imaging.pictures import Pictures
-from measure.estimators import crossing
+from measure.estimators import crossings
 from measure.estimators.gradient import GRADIENT
 from measure.features.calipers import edge_calipers
 from measure.features.layout import layout_of, polygon_layout
@@ -131,7 +131,7 @@ def test_sigma_of_an_edge_whose_contrast_fades(rng, monkeypatch):
     ratio = []
     for known, alike in ((replace(layout, strong=pieces), False), (layout, False), (layout, True)):
         if alike:
-            monkeypatch.setattr(crossing, "_counted", lambda found, spread, size: np.ones(found.start.shape))
+            monkeypatch.setattr(crossings, "counted", lambda found, spread, size: np.ones(found.start.shape))
         part = GRADIENT.prepare(known, 0.0).parts[edge]
         middle = np.array([1.0, part.caliper.positions.mean()])
         told = np.sqrt(noise**2 * np.square(middle @ part.respond_within(image, part.pixels)).sum())

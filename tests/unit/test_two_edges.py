@@ -9,10 +9,11 @@ import pytest
 from scipy.special import ndtr
 
 from imaging.features.locator import edge_blur
-from measure.estimators import crossing
+from measure.estimators import crossings
 from measure.estimators.gradient import gradient_locator
 from measure.estimators.separate import PointEstimator
 from measure.features.calipers import Caliper
+from measure.features.lines import trapezoid
 from measure.features.optics import Optics
 from scenes import status
 
@@ -81,10 +82,10 @@ def plainly_found(monkeypatch) -> None:
     """Every point counts as a whole, the steepest descent from one place to the next is taken."""
 
     def steepest(signed):
-        return crossing.Crossings(*crossing._bracket(signed), np.full(signed[:, 0].shape, np.inf))
+        return crossings.Crossings(*crossings.bracket(signed), np.full(signed[:, 0].shape, np.inf))
 
-    monkeypatch.setattr(crossing, "_surest", steepest)
-    monkeypatch.setattr(crossing, "_counted", lambda found, spread, size: np.ones(found.start.shape))
+    monkeypatch.setattr(crossings, "surest", steepest)
+    monkeypatch.setattr(crossings, "counted", lambda found, spread, size: np.ones(found.start.shape))
 
 
 def test_points_that_jump_would_scatter_the_line(monkeypatch):
@@ -123,9 +124,9 @@ def test_a_faint_edge_is_no_pair(contrast):
 def test_how_much_points_count_is_derived(is_whole, monkeypatch):
     """Against central differences of the line through them; without it the derivatives are others."""
     if not is_whole:
-        monkeypatch.setattr(crossing, "_counted_by", lambda rows, spread: np.zeros(rows.shape))
+        monkeypatch.setattr(crossings, "counted_by", lambda rows, spread: np.zeros(rows.shape))
     clean, tool = image(1.3, 12.0, 85), estimator()
-    counted = tool.locator.locate(clean[None]).weights / crossing.trapezoid(PLACES)
+    counted = tool.locator.locate(clean[None]).weights / trapezoid(PLACES)
     assert ((counted > 0.2) & (counted < 0.98)).any()
     toward, step = np.random.default_rng(8).standard_normal((20, *clean.shape)), 1e-3
     above, below = (tool.estimate(clean + sign * step * toward, OPTICS.noise_variance) for sign in (1, -1))
@@ -140,5 +141,5 @@ def test_a_lone_edge_is_found_as_ever():
     """All its points count as a whole."""
     noise = np.random.default_rng(1).normal(0, 1.5, (50, 40, 120))
     points = estimator().locator.locate(image(0.0, 5.0, 20) + noise)
-    np.testing.assert_array_equal(points.weights, np.broadcast_to(crossing.trapezoid(PLACES), (50, PLACES.size)))
+    np.testing.assert_array_equal(points.weights, np.broadcast_to(trapezoid(PLACES), (50, PLACES.size)))
     assert (points.certain == 1).all()

@@ -211,7 +211,10 @@ def test_a_side_is_flat_where_squared_residuals_grow_by_less_than_nine(growth, i
 
 def test_a_circle_that_is_elsewhere_every_time_is_not_looked_for_without_end(monkeypatch):
     """After so many passes it is not found; what is near enough in its second is."""
-    tried = []
+    tried, near = [], []  # moves after which it is near enough
+
+    def tool(picture, name, moved):
+        return SimpleNamespace(moved=moved, is_far=lambda errors: np.full(len(errors), moved not in near))
 
     def measured(images, tool):
         tried.append((len(images), tool.moved))
@@ -220,15 +223,13 @@ def test_a_circle_that_is_elsewhere_every_time_is_not_looked_for_without_end(mon
             np.full((count, 1), 3.0), np.ones((count, 1, 1)), np.full(count, status.OK), np.ones(count, bool)
         )
 
-    monkeypatch.setattr(rims, "rim_tool", lambda picture, name, moved: SimpleNamespace(moved=moved))
+    monkeypatch.setattr(rims, "rim_tool", tool)
     monkeypatch.setattr(rims, "_rounded", lambda tool, row: (float(row[0]),))
-    monkeypatch.setattr(rims, "_is_far", lambda tool, errors: np.ones(len(errors), bool))
     monkeypatch.setattr(rims, "_measured", measured)
     found = rims._find(np.zeros((2, 1, 1)), None, "c1", (0.0,), 4)
     assert found.state.tolist() == [status.LOW_CONTRAST] * 2
     assert tried == [(2, (3.0 * k,)) for k in range(5)]
-    tried.clear()
-    monkeypatch.setattr(rims, "_is_far", lambda tool, errors: np.full(len(errors), tool.moved == (0.0,)))
+    near.append((3.0,))
     found = rims._find(np.zeros((2, 1, 1)), None, "c1", (0.0,), 4)
     assert found.state.tolist() == [status.OK] * 2
     assert found.errors.ravel().tolist() == [6.0] * 2

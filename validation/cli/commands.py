@@ -27,6 +27,7 @@ COMMANDS = {
     "catalogue": ("catalogue", "Check a catalogue of sensors, lenses and lights for contradictions."),
     "design": ("design", "Which camera, lens and light to buy for a drawing's tolerances, at the least cost."),
     "msa": ("msa", "Measurement system analysis: %GRR, ndc, Cg, Cgk predicted, and a study beside them."),
+    "export": ("export", "A recipe that measures one picture at a known place with NumPy alone."),
     "dossier": ("dossier", "The validation of this software for one scene, as an assessor reads it."),
     "cost": ("cost", "Measure what each parameter costs and gives on this machine."),
     "explore": ("explore", "A page on which camera and lights are dragged and the prediction answers."),

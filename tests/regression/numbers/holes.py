@@ -10,7 +10,7 @@ import measure
 import planner
 import scenes
 from imaging.geometry.projection import project
-from measure.features import found, linearity, rim_noise, rims, shape, tools
+from measure.features import found, linearity, rim_fit, rim_noise, rims, shape, tools
 from measure.features.layout import layout_of
 from measure.features.optics import Optics
 from tests.oracle import polygon_image
@@ -66,7 +66,7 @@ def _rims(name, which, lit=True):
         "tools": [[each.design, each.weights, each.inward, each.state] for each in (tool, near)],
         "found": rims.find_circle(images, picture, which), "away": rims.find_circle(away, picture, which),
         "once": rims._find(stack[1], picture, which, rims.unmoved(picture, which), 0),
-        "far": rims._is_far(tool, off), "rounded": [rims._rounded(tool, row) for row in off],
+        "far": tool.is_far(off), "rounded": [rims._rounded(tool, row) for row in off],
         "response": rims.circle_response(images[0], picture, which).toarray(),
         "measured": rims._measured(stack[0], near),
         "away again": rims.circle_response(away[0], picture, which).toarray(),
@@ -78,8 +78,8 @@ def _tools():
     design, weights = rng.normal(0, 1, (9, 3)), rng.uniform(0.2, 2, 9)
     optics = Optics((50, 70), 0.7, 1.0, 1.2, 3.4)
     valid = np.array([np.ones(9), [1, 1, 0, 0, 0, 0, 0, 0, 0], [1, 0, 1, 1, 0, 1, 1, 1, 0], np.zeros(9)], bool)
-    tool = tools.RimTool(None, design, weights, np.zeros(9), "ok", optics, np.zeros((9, 2)))
-    flat = tools.RimTool(None, design * [1, 1, 0], weights, np.zeros(9), "ok", optics, np.zeros((9, 2)))
+    tool = rim_fit.RimFit(design, weights, np.zeros(9), "ok", optics)
+    flat = rim_fit.RimFit(design * [1, 1, 0], weights, np.zeros(9), "ok", optics)
     places = np.array([[3.0, 30.0], [60.0, 47.0], [np.nan, 20.0], [30.0, 20.0]])
     return {"fit": tool.fit(valid), "flat": flat.fit(valid[:1]), "held": tools.held(places, optics),
             "small": tools.held(places, replace(optics, shape=(9, 12)))}  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 import measure
 import planner
 from measure.boards import bend, saddle
-from measure.estimators import crossing, profile
+from measure.estimators import crossing, crossings, profile, windows
 from measure.features import conic
 from measure.find import four_sides, rounds
 from measure.photo import rounding
@@ -41,13 +41,13 @@ def _crossings():
     rng = np.random.default_rng(5)
     x = np.linspace(-3, 3, 25)
     rows = -np.tanh(x - np.array([[0.31], [-0.77], [1.1], [0.0]])) + rng.normal(0, 0.02, (4, 25))
-    best = crossing._bracket(rows)
+    best = crossings.bracket(rows)
     places, normals = rng.uniform(6, 14, (3, 2)), np.array([[1.0, 0], [0.6, 0.8], [-0.8, 0.6]])
     return {
-        "polarity": crossing._polarity(rows), "rise": crossing._rise(rows), "reversed": crossing._reversed(rows),
-        "bracket": best, "refined": crossing._refine(rows, best[0], np.zeros(4)),
-        "weights": crossing._cubic_weights(np.array([0.1, 0.5, 0.83])),
-        "across": crossing.places_across(places, normals, 1.7),
+        "polarity": crossings.polarity(rows), "rise": crossings.rise(rows), "reversed": crossings.is_reversed(rows),
+        "bracket": best, "refined": crossings.refine(rows, best[0], np.zeros(4)),
+        "weights": crossings.cubic_weights(np.array([0.1, 0.5, 0.83])),
+        "across": windows.places_across(places, normals, 1.7),
         "rows": crossing.gaussian_rows(places, 1.3, (20, 22)).toarray(),
     }  # fmt: skip
 

@@ -1,0 +1,38 @@
+"""The shift and turn at which all expected edges meet an edge of an image. NumPy alone: a recipe has this file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """Which poses of a layout are tried, and what tells how well one meets the edges of an image.
+
+    Attributes
+    ----------
+    pixels : ndarray of int, shape (P, T, k)
+        Flat indices of the pixels whose mean is an image's level at T places across each of P pieces of the edges.
+    slope : ndarray, shape (T, T)
+        Takes the derivative across the edge of such levels.
+    candidates : ndarray, shape (C, 3)
+        Shifts x, y, px, and turns, rad, the smallest first.
+    places : ndarray of int, shape (C, P)
+        At which of the T places each piece then is.
+    """
+
+    pixels: np.ndarray
+    slope: np.ndarray
+    candidates: np.ndarray
+    places: np.ndarray
+
+    def poses(self, images: np.ndarray) -> np.ndarray:
+        """The best candidate in each of n images of P pixels, (n, P): shape (n, 3)."""
+        levels = images[:, self.pixels].mean(-1)
+        rise = np.abs(levels @ self.slope.T)
+        score = np.zeros((len(self.candidates), len(images)))
+        for piece, place in zip(np.moveaxis(rise, 0, -1), self.places.T, strict=True):
+            score += piece[place]
+        return self.candidates[score.argmax(0)]
