@@ -1,4 +1,4 @@
-"""What a picture of another station does to the lines and circles that are found in it by who believes the scene.
+"""What a picture of another station does to the lines, circles and boards that are found in it by who believes the scene.
 
 Every point of a feature is recorded elsewhere; the believed camera's model takes it back to ideal coordinates, and the
 least-squares line or circle through all points of the feature follows. It is found as the estimators find it: densely
@@ -57,11 +57,12 @@ class Features:
 
         Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
         circle's centre in its plane and change of its radius (the scene's unit); the zones of forms, with the sign of
-        the farthest point's side (the scene's unit). NaN where a feature is not seen.
+        the farthest point's side (the scene's unit); a board's own parameters. NaN where a feature is not seen.
         """
         parts = [self._lines(station).ravel()]
         parts += [self._circle(station, c) for c in range(len(self.known.circles))]
         parts.append(np.array([self._form(station, quantity) for quantity in self.known.seen.forms]))
+        parts.append(self._board(station))
         return np.concatenate(parts)
 
     @cached_property
@@ -128,6 +129,15 @@ class Features:
         size = needed(reference_of(quantity))(off)
         return float(size * np.sign(off[np.abs(off).argmax()]))
 
+    def _board(self, station: Station) -> np.ndarray:
+        """Parameters of a board, of which none are where there is none."""
+        here, there = self.pictures.scene.placement.board, station.scene.placement.board
+        board = None if self.known.placing is None else self.known.placing.board
+        if here is None or there is None or board is None:
+            return np.zeros(0)
+        moved = self._displaced(station, here.points, station.board_at(there.points))
+        return np.einsum("kni,ni->k", board.gain(), moved)
+
     def _beside_edge(self, station: Station, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
         """Distances of an edge's points, the scene's unit, and the design of its line."""
         view = self.known.view
@@ -148,10 +158,12 @@ class Features:
         off = np.einsum("ni,ni->n", self._displaced(station, points), normal)[used]
         return off / design[:, 2], design[:, :3] / design[:, 2:3]
 
-    def _displaced(self, station: Station, points: np.ndarray) -> np.ndarray:
-        """How far off points (..., 3) are found, ideal px of the believed camera, shape (..., 2)."""
+    def _displaced(self, station: Station, points: np.ndarray, truly: np.ndarray | None = None) -> np.ndarray:
+        """How far off points (..., 3) are found, ideal px of the believed camera, shape (..., 2); they are ``truly``
+        elsewhere beside the part, where that is given."""
         flat, camera = points.reshape(-1, 3), self.pictures.scene.camera
-        found = undistorted(station.record(flat), camera) - project_ideal(flat, self.pictures.sensors, camera)
+        there = flat if truly is None else truly.reshape(-1, 3)
+        found = undistorted(station.record(there), camera) - project_ideal(flat, self.pictures.sensors, camera)
         return found.reshape(*points.shape[:-1], 2)
 
 

@@ -23,6 +23,7 @@ NOISE, PATTERN, MODEL, ROUNDING = "pixel noise", "fixed pattern", "model error",
 BIAS = "bias by "  # and what its correction is not sure of
 TOGETHER = "telecentricity x depth"
 DATUMS = "datums"  # where they lie on the part, beside where its model says
+POINTS = "board points"  # where they are on the board: print, flatness
 TEMPERATURE, EXPANSION = "temperature_K", "expansion_per_K"
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length
 
@@ -85,7 +86,8 @@ def terms(
         if together is not None and together[m] > 0:
             rows.append(Term(TOGETHER, 0.0, Uncertain(sd=float(together[m])), each.unit, 1.0))
         if datums[m] > 0:
-            rows.append(Term(DATUMS, 0.0, Uncertain(sd=float(datums[m])), each.unit, 1.0))
+            name = DATUMS if scene.placement.board is None else POINTS
+            rows.append(Term(name, 0.0, Uncertain(sd=float(datums[m])), each.unit, 1.0))
         if pattern[m] > 0:
             rows.append(Term(PATTERN, 0.0, Uncertain(sd=float(pattern[m])), each.unit, 1.0))
         found.append(rows + _stated(scene, each))
@@ -93,7 +95,8 @@ def terms(
 
 
 def _by_datums(pictures: Pictures) -> np.ndarray:
-    """Standard uncertainties (M,) by what the datums are off on the part; 0 where its place is known otherwise."""
+    """Standard uncertainties (M,) by what the datums are off on the part, or a board's points on it; 0 where its place is
+    known otherwise."""
     errors = variance_model(DEFAULT_MODEL)(pictures)
     if errors.adjustment is None:
         return np.zeros(len(errors.measurands.quantities))
