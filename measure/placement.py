@@ -41,7 +41,7 @@ class Located:
     status : str
         ``ok``; ``ambiguous`` where another place explains the picture as well; ``not_visible`` where none does.
     explained : float
-        Share of the model's visible edges on which a step of grey levels lies.
+        Share of the model's visible edges on which a step of grey levels lies, or of the board's points that are found.
     reason : str
         Why it is not ``ok``; empty where it is.
     """
@@ -78,16 +78,15 @@ def locate(
     """
     picture = Picture.of(scene, sensor, light)
     if not picture.scene.placement.is_estimated:
-        raise InvalidInput(
-            f"placement.from must be datums or board to find the part, got {picture.scene.placement.source!r}"
-        )
+        told = picture.scene.placement.source
+        raise InvalidInput(f"placement.from must be datums or board to find the part, got {told!r}")
     camera = picture.scene.camera
     levels = checked_image(one_picture(image), (camera.height, camera.width))
     if picture.scene.placement.board is not None:
-        start = by_board(levels, picture)
+        start, share = by_board(levels, picture)
         if start is None:
             return _nowhere(picture, status.NOT_VISIBLE, "no board as told lies within what is plausible", 0.0)
-        return adjusted(levels, picture, start, estimator)
+        return adjusted(levels, picture, start, estimator, share)
     found = candidates(levels, picture)
     if not found:
         return _nowhere(picture, status.NOT_VISIBLE, "no place within what is plausible explains the picture", 0.0)

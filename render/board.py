@@ -38,7 +38,8 @@ def board_window(picture: Picture) -> tuple[slice, slice] | None:
     board, camera = picture.scene.placement.board, picture.scene.camera
     if board is None:
         return None
-    around = np.concatenate([a + _ALONG * (b - a) for a, b in zip(board.outline, np.roll(board.outline, -1, 0))])
+    start, stop = board.outline[:, None], np.roll(board.outline, -1, 0)[:, None]
+    around = (start + _ALONG * (stop - start)).reshape(-1, 3)
     seen = recorded(project_ideal(around, np.array(list(picture.sensor)), camera), camera)
     size = np.array([camera.width, camera.height])
     low, high = (

@@ -15,7 +15,7 @@ PITCH = "placement.board.pitch"
 """Key of the one number of a board that may carry an uncertainty."""
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 _SKEW = 1e-6  # cosine of the angle between the directions that a board may have
-AROUND = 64  # sides of the polygon that stands for a dot in renders; its area is the circle's to 0.16 %
+AROUND = 32  # sides of the polygon that stands for a dot in images; its area is the circle's
 _ROUNDED = np.sqrt(2 * np.pi / AROUND / np.sin(2 * np.pi / AROUND))  # of its radius, which makes the area the circle's
 
 

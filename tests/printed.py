@@ -1,4 +1,4 @@
-"""A board that is not quite as its scene says: displaced beside the part, of another pitch, each point off its place."""
+"""A board that is not quite as its scene says: displaced beside the part, of another pitch, points off their places."""
 
 from __future__ import annotations
 

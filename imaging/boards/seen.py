@@ -1,9 +1,9 @@
 """What the points of a board beside the part tell of the place of both.
 
-Points are found off by y = J p + L b + s + e: J their derivative by the placement p (of part and board together), L b what
-is not known of the board's place relative to the part and of its pitch, s what print and flatness leave open of each
-point, e noise. All that they tell of p is in k numbers (k the components that are not exact): the place that fits the
-points best, in units in which b, s and e together have the covariance 1. These count as the parameters of one more
+Points are found off by y = J p + L b + s + e: J their derivative by the placement p (of part and board together), L b
+what is not known of the board's place relative to the part and of its pitch, s what print and flatness leave open of
+each point, e noise. All that they tell of p is in k numbers (k the components that are not exact): the place that fits
+the points best, in units in which b, s and e together have the covariance 1. These count as the parameters of one more
 feature beside lines and circles (`imaging.features.seen`).
 """
 
@@ -202,14 +202,9 @@ def _unit(pictures: Pictures, board: Board, places: np.ndarray) -> np.ndarray:
     y, x = rows // 2, columns // 2
     grids = grids[..., y - 1 : y + 2, x - 1 : x + 2, :]
     middle = board.points.reshape(rows, columns, 3)[y, x]
-    blur = np.broadcast_to(
-        blur_at(
-            pictures.scene.camera,
-            depth(middle[None], pictures.sensors, pictures.scene.camera)[..., 0],
-            grids[..., 1, 1, :],
-        ),
-        grids.shape[:-3],
-    )
+    camera = pictures.scene.camera
+    away = depth(middle[None], pictures.sensors, camera)[..., 0]
+    blur = np.broadcast_to(blur_at(camera, away, grids[..., 1, 1, :]), grids.shape[:-3])
     found = np.empty((*grids.shape[:-3], 2, 2))
     for index in np.ndindex(*grids.shape[:-3]):
         args = grids[index], float(blur[index])

@@ -5,9 +5,9 @@ at the edge's first end and the rotation theta (rad); of each circle two shifts 
 change of its radius (the scene's unit); of each curved surface, which counts as a circle, the three of
 `Curved.parameters`, of a cone four; of each form (`scenes.measurands.form`) its size, which is found from points that
 no line or circle stands for (the scene's unit); of a board beside the part the numbers that tell its place
-(`imaging.boards.seen`). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then
-the circles (`Seen.numbers`), then the forms, then the board's. Image coordinates are ideal px from the image's middle, in which lines are
-straight.
+(`imaging.boards.seen`). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then the circles
+(`Seen.numbers`), then the forms, then the board's. Image coordinates are ideal px from the image's middle, in which
+lines are straight.
 """
 
 from __future__ import annotations

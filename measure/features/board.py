@@ -60,9 +60,9 @@ def find_board(images: np.ndarray, picture: Picture, told: SeenBoard) -> FoundBo
     return FoundBoard(np.array(offsets), np.array(covariance), np.array(state))
 
 
-def by_board(image: np.ndarray, picture: Picture) -> np.ndarray | None:
+def by_board(image: np.ndarray, picture: Picture) -> tuple[np.ndarray | None, float]:
     """The placement (6,) at which a picture's board is seen where an image (height, width) has it, to some tenths of a
-    px; None where there is none within what is plausible.
+    px, and the share of its points that are found; None where there is none within what is plausible.
 
     The board may be seen from any side: the order of its points is that of the least placement.
     """
@@ -70,14 +70,14 @@ def by_board(image: np.ndarray, picture: Picture) -> np.ndarray | None:
     try:
         found = (chessboard.chessboard if board.kind == "chessboard" else dots.dot_grid)(image, board.shape)
     except InvalidInput:
-        return None
+        return None, 0.0
     grid = undistorted(found.corners, camera).reshape(*found.shape[::-1], 2)
     columns, rows = board.shape
     turned = [np.rot90(each, k) for each in (grid, grid[::-1]) for k in range(4)]
     each = [_nearest(picture, there) for there in turned if there.shape[:2] == (rows, columns)]
     most = _BEYOND * limits(picture.scene.uncertainty) + 1e-9
     good = [(left, place) for left, place in each if left < _FAR and (np.abs(place) <= most).all()]
-    return min(good, key=lambda one: one[0])[1] if good else None
+    return (min(good, key=lambda one: one[0])[1] if good else None), float(found.measured.mean())
 
 
 def _nearest(picture: Picture, grid: np.ndarray) -> tuple[float, np.ndarray]:
@@ -94,10 +94,8 @@ def _nearest(picture: Picture, grid: np.ndarray) -> tuple[float, np.ndarray]:
         if good.sum() < _FEWEST:
             return np.inf, here
         left = float(np.sqrt((off[good] ** 2).sum(1).mean()))
-        slopes = jacobian_ideal(points, sensor, there.scene.camera) @ steps(
-            points, np.array(there.scene.camera.look_at)
-        )
-        rows = (slopes * np.repeat([1.0, np.pi / 180], 3))[good][..., free] * u[free]
+        by_place = steps(points, np.array(there.scene.camera.look_at)) * np.repeat([1.0, np.pi / 180], 3)
+        rows = (jacobian_ideal(points, sensor, there.scene.camera) @ by_place)[good][..., free] * u[free]
         rows = np.concatenate([rows.reshape(-1, free.size), _HELD * np.eye(free.size)])
         step = np.zeros(6)
         step[free] = np.linalg.lstsq(rows, np.append(off[good], np.zeros(free.size)), rcond=None)[0] * u[free]

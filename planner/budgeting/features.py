@@ -1,4 +1,4 @@
-"""What a picture of another station does to the lines, circles and boards that are found in it by who believes the scene.
+"""What a picture of another station does to lines, circles and boards that are found in it by who believes the scene.
 
 Every point of a feature is recorded elsewhere; the believed camera's model takes it back to ideal coordinates, and the
 least-squares line or circle through all points of the feature follows. It is found as the estimators find it: densely

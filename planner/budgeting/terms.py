@@ -95,8 +95,8 @@ def terms(
 
 
 def _by_datums(pictures: Pictures) -> np.ndarray:
-    """Standard uncertainties (M,) by what the datums are off on the part, or a board's points on it; 0 where its place is
-    known otherwise."""
+    """Standard uncertainties (M,) by what the datums are off on the part, or a board's points on it; 0 where the
+    part's place is known otherwise."""
     errors = variance_model(DEFAULT_MODEL)(pictures)
     if errors.adjustment is None:
         return np.zeros(len(errors.measurands.quantities))
