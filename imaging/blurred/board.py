@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from imaging.blurred.arrangement import BACKGROUND, Arrangement, Region, along_blur
@@ -18,12 +21,17 @@ _LOOKED = np.stack(np.meshgrid(np.linspace(0, 1, 21), np.linspace(0, 1, 21)), -1
 _NONE = np.empty(0, int)
 
 
-def add_board(image: np.ndarray, pictures: Pictures) -> None:
-    """Add the signal of a scene's board, where it has one, to the image (height, width) of one picture, grey levels."""
+def add_board(image: np.ndarray, pictures: Pictures, seen: Callable[[np.ndarray], np.ndarray] | None = None) -> None:
+    """Add the signal of a scene's board, where it has one, to the image (height, width) of one picture, grey levels.
+
+    ``seen`` says of points (n, 3) at which ideal px (n, 2) they are, where that is not as the scene says.
+    """
     board = pictures.scene.placement.board
     if board is None:
         return
-    arrangement = _arrangement(pictures, board)
+    arrangement, points = _arrangement(pictures, board)
+    if seen is not None:
+        arrangement = replace(arrangement, vertices=seen(points))
     camera = pictures.scene.camera
     margin = 2 + 7 * camera.most_blur_px
     places = arrangement.recorded(arrangement.vertices)
@@ -35,8 +43,8 @@ def add_board(image: np.ndarray, pictures: Pictures) -> None:
         image[low[1] : high[1], low[0] : high[0]] += model.image(model.start()).reshape(x.shape)
 
 
-def _arrangement(pictures: Pictures, board: Board) -> Arrangement:
-    """What a board shows: two regions, what is bright and what is dark."""
+def _arrangement(pictures: Pictures, board: Board) -> tuple[Arrangement, np.ndarray]:
+    """What a board shows: two regions, what is bright and what is dark; and its vertices in space (V, 3)."""
     camera, sensor = pictures.scene.camera, pictures.sensors
     places, ends, sides = _pieces(board)
     points = board.at(places)
@@ -46,7 +54,7 @@ def _arrangement(pictures: Pictures, board: Board) -> Arrangement:
     sides = sides if a * d - b * c > 0 else sides[:, ::-1]  # which side is left depends on from where it is seen
     looked = board.at(board.outer[0] + _LOOKED * (board.outer[2] - board.outer[0]))
     seen = recorded(project_ideal(looked, sensor, camera), camera)
-    return Arrangement(
+    made = Arrangement(
         vertices=vertices,
         defocus=signed_confusion(camera, depth(points, sensor, camera)),
         pieces=ends,
@@ -60,6 +68,7 @@ def _arrangement(pictures: Pictures, board: Board) -> Arrangement:
         camera=camera,
         blur_px=along_blur(vertices[ends], camera),
     )  # fmt: skip
+    return made, points
 
 
 def _pieces(board: Board) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

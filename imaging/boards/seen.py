@@ -33,7 +33,7 @@ from scenes.board import PITCH
 from scenes.placement import of_board, prior
 
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
-_CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
+CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
 _UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
 _UNITS = np.repeat([1.0, np.pi / 180], 3)  # of a placement's components: the scene's unit, and degrees
 
@@ -188,7 +188,7 @@ def _apart(pictures: Pictures, board: Board) -> np.ndarray:
     away = np.einsum("...si,...spi->...sp", normal, part[..., None, :, :] - outline[..., :, None, :])
     middle = np.einsum("...si,...si->...s", normal, outline.mean(-2, keepdims=True) - outline)
     beyond = -np.sign(middle)[..., None] * away
-    return (beyond > _CLEAR).all(-1).any(-1)[..., None]
+    return (beyond > CLEAR).all(-1).any(-1)[..., None]
 
 
 def _unit(pictures: Pictures, board: Board, places: np.ndarray) -> np.ndarray:
