@@ -15,6 +15,8 @@ from tests import placements as parts
 CAMERA = {"width": 352, "height": 400, "look_at": [0, 16, 6]}
 """Of `tests.placements`, with room for a board behind the part."""
 
+_WHOLE = np.array([0.6, 0.6, 1, 1, 1, 1])  # of `tests.placements.MOST`
+
 
 class Printed(Board):
     """A board as it truly is."""
@@ -48,9 +50,16 @@ def scene(folder: Any, name: str, kind: str = "chessboard", **changes: Any) -> S
     return made.with_(**changes) if changes else made
 
 
+def place(picture: Picture, rng: np.random.Generator) -> np.ndarray:
+    """A place of the part at random, (6,); with a board such that all of it is in the picture."""
+    return parts.drawn(rng, parts.MOST * (1.0 if picture.scene.placement.board is None else _WHOLE))
+
+
 def drawn(picture: Picture, rng: np.random.Generator) -> Picture:
-    """The picture with a board as it may truly be."""
+    """The picture with a board as it may truly be; the same where there is none."""
     scene, board = picture.scene, picture.scene.placement.board
+    if board is None:
+        return picture
     shift, turn = np.split(of_board(scene.uncertainty) * rng.standard_normal(6), 2)
     pitch = next(each.u for each in scene.uncertain if each.key.endswith("pitch"))
     told = board.model_dump() | {
