@@ -184,7 +184,7 @@ def test_a_board_takes_the_place_of_the_camera_in_the_budget(block):
 
 
 def test_a_board_that_is_not_beside_the_part_tells_nothing(block):
-    for corner in ([-16, 24, 0], [-16, 90, 0]):  # behind it in the picture; outside the picture
+    for corner in ([-16, 24, 0], [-16, 150, 0]):  # behind it in the picture; outside the picture
         told = planner.predict(_with(block, placement={"board": {"corner": corner}})).measurands
         assert {each.status for each in told} == {"unplaced"}
         assert "no point of the board is found" in told[0].reason

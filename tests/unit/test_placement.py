@@ -288,5 +288,5 @@ def test_a_part_that_may_lie_the_other_way_round_is_refused_by_name(found):
     assert not np.isfinite(where.placement).any()
     nothing = measure.locate(np.full_like(image, 16.0), picture)
     assert (nothing.status, nothing.explained) == ("not_visible", 0.0)
-    with pytest.raises(InvalidInput, match=r"placement\.from must be datums to find the part, got 'known'"):
+    with pytest.raises(InvalidInput, match=r"placement\.from must be datums or board to find the part, got 'known'"):
         measure.locate(image, _with(picture, placement={"from": "known", "datums": [], "datum_sd": None}))
