@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
 import measure
 import planner
@@ -191,13 +192,19 @@ def test_a_board_that_is_not_beside_the_part_tells_nothing(block):
 
 
 @pytest.fixture(scope="module")
-def found(folder):
-    """A part and its board somewhere, their picture, their true place."""
+def dotted(folder):
+    """The block with a few dots behind it."""
     scene = printed.scene(folder, "block", "dots")
     scene = scene.with_(placement={"board": {"shape": [6, 4], "pitch": {"value": 6.0, "sd": 2e-4}}})
-    picture = Picture.of(scene, parts.SENSOR, parts.LIGHT)
+    return Picture.of(scene, parts.SENSOR, parts.LIGHT)
+
+
+@pytest.fixture(scope="module")
+def found(dotted):
+    """A part and its board somewhere, their picture, their true place."""
+    picture = dotted
     rng, there = np.random.default_rng(3), np.array([3.0, -2.0, 1.5, 2.0, -2.0, 2.5])
-    (image,) = render.expose(printed.seen(printed.drawn(picture, rng), there), scene.noise, rng, 1)
+    (image,) = render.expose(printed.seen(printed.drawn(picture, rng), there), picture.scene.noise, rng, 1)
     return picture, image, there
 
 
@@ -212,6 +219,22 @@ def test_a_part_is_found_by_its_board(found):
     assert (np.abs(told.value - told.nominal) < 5 * np.hypot(told.sigma, told.u_placed)).all()
     as_said = measure.measure(image, picture.unlit(), estimator="gradient")  # negative control: there is none
     assert not np.isfinite(as_said.value).any() or "ok" not in as_said.status
+
+
+def test_places_are_as_well_known_as_told(dotted):
+    """`python -m tests.proofs placements --board dots`, reduced: chi-square of 12 places, of a board drawn anew."""
+    rng, total, count = np.random.default_rng(8), 0.0, 12
+    for _ in range(count):
+        there = printed.place(dotted, rng)
+        clean = printed.seen(printed.drawn(dotted, rng), there)
+        (image,) = render.expose(clean, dotted.scene.noise, rng, 1)
+        where = measure.locate(image, dotted, estimator="gradient")
+        off = difference(there, where.placement)
+        total += off @ np.linalg.solve(where.covariance, off)
+    low, high = chdtri(6 * count, [0.9995, 0.0005])
+    assert low < total < high, total
+    for factor in (0.5, 2.0):  # negative controls
+        assert not low < factor * total < high
 
 
 def test_another_board_is_not_taken_for_it(found):
