@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import cv2
 import numpy as np
 from scipy import sparse
 from scipy.special import chdtrc
@@ -30,6 +31,7 @@ _FEWEST = 6  # points that a board is told by
 _STEPS, _FAR = 10, 2.0  # of Gauss and Newton; px that a board's points are left off by at most
 _HELD = 1e-3  # px: of a placement of one standard uncertainty, where points do not tell it
 _BEYOND = 1.25  # of what is plausible: where noise may take a place that is hardly told
+_WIDE = 4  # px that a lens may bend a board's sides by, or more
 _AROUND = 96  # places on a dot's outline
 
 
@@ -101,6 +103,20 @@ def _nearest(picture: Picture, grid: np.ndarray) -> tuple[float, np.ndarray]:
         step[free] = np.linalg.lstsq(rows, np.append(off[good], np.zeros(free.size)), rcond=None)[0] * u[free]
         here = combined(here, step)
     return left, here
+
+
+def board_pixels(picture: Picture) -> np.ndarray:
+    """Pixels that a picture's board is found from, bool (height, width): about all its points."""
+    board, camera = picture.scene.placement.board, picture.scene.camera
+    found = np.zeros((camera.height, camera.width), np.uint8)
+    if board is not None:
+        columns, rows = board.shape
+        around = np.array([(-1, -1), (columns, -1), (columns, rows), (-1, rows)])
+        corners = project(board.at(around), np.array(list(picture.sensor)), camera)
+        if np.isfinite(corners).all():
+            cv2.fillConvexPoly(found, np.rint(corners).astype(np.int32), 1)
+            found = cv2.dilate(found, np.ones((2 * _WIDE + 1,) * 2, np.uint8))
+    return found.astype(bool)
 
 
 @dataclass(frozen=True, eq=False)

@@ -271,5 +271,18 @@ def test_a_render_shows_the_board_of_the_image_model(folder):
     np.testing.assert_array_equal(bare[130:], drawn[130:])
 
 
+def test_noise_of_the_board_is_drawn_where_it_is_asked_for(block):
+    """Values of images with noise where they say that it counts, and everywhere, are the same."""
+    clean = printed.seen(block, np.zeros(6))
+    where = measure.region_of_interest(block, estimators=("gradient",))
+    some, whole = (
+        measure.measure(render.expose(clean, block.scene.noise, np.random.default_rng(1), 1, here)[0], block.unlit(),
+                        estimator="gradient").value
+        for here in (where, None)
+    )  # fmt: skip
+    np.testing.assert_array_equal(some, whole)
+    assert where.mean() < 0.6
+
+
 def test_of_board_is_what_is_said_of_it(block):
     np.testing.assert_array_equal(of_board(block.scene.uncertainty), [0.003] * 3 + [0.005] * 3)
