@@ -35,6 +35,7 @@ from scenes.placement import of_board, prior
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
 CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
 _UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
+_EXACT = 1e-16  # px^2: of points without noise and print
 _UNITS = np.repeat([1.0, np.pi / 180], 3)  # of a placement's components: the scene's unit, and degrees
 
 
@@ -89,13 +90,14 @@ class SeenBoard:
 
     def _fit(self, noise: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """Weighted least squares, (..., k, n, 2), and sizes and directions of what the points tell."""
-        whole = noise + self.printed
+        whole = noise + self.printed + _EXACT * np.eye(2)
         there = np.isfinite(np.einsum("...ii->...", whole))[..., None, None]
         weight = np.where(there, np.linalg.inv(np.where(there, whole, np.eye(2))), 0.0)
         back = np.einsum("...nik,...nij->...knj", self.slopes, weight)
         sizes, directions = np.linalg.eigh(np.einsum("...knj,...njl->...kl", back, self.slopes))
-        inverse = np.where(sizes > _UNTOLD, 1 / np.where(sizes > _UNTOLD, sizes, 1.0), 0.0)
-        return np.einsum("...ka,...a,...la,...lnj->...knj", directions, inverse, directions, back), (sizes, directions)
+        inverse = np.where(sizes > _UNTOLD, 1 / np.where(sizes > _UNTOLD, sizes, 1.0), 0.0)[..., None, :]
+        covariance = (directions * inverse) @ np.swapaxes(directions, -1, -2)
+        return np.einsum("...kl,...lnj->...knj", covariance, back), (sizes, directions)
 
 
 def seen_board(pictures: Pictures, seen: Seen) -> SeenBoard | None:
