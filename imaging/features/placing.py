@@ -76,6 +76,10 @@ class Placing:
         with np.errstate(divide="ignore", invalid="ignore"):
             slopes = _slopes(seen)[..., free] * steps[free]
             datums, scatter = _datums(scene, seen)
+        lead = (
+            slopes.shape[:-2] if board is None else board.root.shape[:-2]
+        )  # a board's noise depends on the lights, too
+        slopes, scatter = (np.broadcast_to(each, (*lead, *each.shape[-2:])).copy() for each in (slopes, scatter))
         beside = np.zeros(scatter.shape)
         if board is not None:
             part = seen.of_board

@@ -284,5 +284,18 @@ def test_noise_of_the_board_is_drawn_where_it_is_asked_for(block):
     assert where.mean() < 0.6
 
 
+def test_many_pictures_at_once_are_as_each_alone(block):
+    """Sensors against lights: a board's noise depends on both."""
+    sensors, lights = (
+        np.array([[28.0, 300.0], [20.0, 290.0]])[:, None],
+        np.array([[22.0, 60.0], [30.0, 40.0], [25, 10]]),
+    )
+    errors = variance_model("calibrated")(Pictures.of(block.scene, sensors, lights))
+    for i, j in np.ndindex(2, 3):
+        one = variance_model("calibrated")(Pictures.of(block.scene, sensors[i, 0], lights[j]))
+        np.testing.assert_allclose(errors.placed[i, j], one.placed, rtol=1e-9)
+        np.testing.assert_allclose(errors.variances_object[i, j], one.variances_object, rtol=1e-3)  # a glance
+
+
 def test_of_board_is_what_is_said_of_it(block):
     np.testing.assert_array_equal(of_board(block.scene.uncertainty), [0.003] * 3 + [0.005] * 3)
