@@ -1,4 +1,5 @@
-"""Where the part lies in a picture: found anywhere within what is plausible, then adjusted from its datums."""
+"""Where the part lies in a picture: found anywhere within what is plausible, then adjusted from its datums or a
+board."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import numpy as np
 from imaging.light.appearance import is_plain
 from imaging.placed import combined, placed
 from measure.estimators.registry import best_estimator
+from measure.features.board import by_board
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.quantities import MeasuredFeatures, find
 from measure.registration import Place, candidates, rivals
@@ -39,7 +41,7 @@ class Located:
     status : str
         ``ok``; ``ambiguous`` where another place explains the picture as well; ``not_visible`` where none does.
     explained : float
-        Share of the model's visible edges on which a step of grey levels lies.
+        Share of the model's visible edges on which a step of grey levels lies, or of the board's points that are found.
     reason : str
         Why it is not ``ok``; empty where it is.
     """
@@ -62,7 +64,7 @@ def locate(
     image : ndarray, shape (height, width)
         Grey levels.
     scene, sensor, light, estimator
-        As for `measure.measure`; the scene's placement is from datums.
+        As for `measure.measure`; the scene's placement is from datums or a board.
 
     Raises
     ------
@@ -72,13 +74,19 @@ def locate(
     Notes
     -----
     Coarsely by `measure.registration`, whose best places are compared; then by Gauss-Newton steps of the adjustment of
-    the datums (`imaging.features.placing`) until they settle.
+    the datums (`imaging.features.placing`) until they settle. A board is looked for itself, anywhere in the picture.
     """
     picture = Picture.of(scene, sensor, light)
     if not picture.scene.placement.is_estimated:
-        raise InvalidInput(f"placement.from must be datums to find the part, got {picture.scene.placement.source!r}")
+        told = picture.scene.placement.source
+        raise InvalidInput(f"placement.from must be datums or board to find the part, got {told!r}")
     camera = picture.scene.camera
     levels = checked_image(one_picture(image), (camera.height, camera.width))
+    if picture.scene.placement.board is not None:
+        start, share = by_board(levels, picture)
+        if start is None:
+            return _nowhere(picture, status.NOT_VISIBLE, "no board as told lies within what is plausible", 0.0)
+        return adjusted(levels, picture, start, estimator, share)
     found = candidates(levels, picture)
     if not found:
         return _nowhere(picture, status.NOT_VISIBLE, "no place within what is plausible explains the picture", 0.0)
@@ -107,7 +115,7 @@ def adjusted(
             found = find(image[None], there if lit else there.unlit(), method)
             step = _step(found, picture)
             if not np.isfinite(step).all() or not _told(found).any():
-                return _nowhere(picture, status.NOT_VISIBLE, "none of its datums is found", explained)
+                return _nowhere(picture, status.NOT_VISIBLE, "nothing that tells it is found", explained)
             before, here = here, combined(here, step)
             if _moved(found) < _SETTLED:
                 break
@@ -130,8 +138,10 @@ def _step(found: MeasuredFeatures, picture: Picture) -> np.ndarray:
 
 
 def _moved(found: MeasuredFeatures) -> float:
-    """How far that moves the datums' ends or radii at most, px."""
+    """How far that moves the datums' ends or radii, or the board's points, at most, px."""
     placing, seen = found.known.placing, found.known.seen
+    if placing.board is not None:
+        return float(np.linalg.norm(placing.board.slopes @ found.placement[0], axis=-1).max())
     moved = placing.slopes @ found.placement[0]
     lengths = np.linalg.norm(seen.along, axis=-1)
     size = np.ones(seen.count)

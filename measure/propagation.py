@@ -17,6 +17,7 @@ from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.kinds import ESTIMATORS
 from measure.estimators.separate import SeparateEstimator
 from measure.features import arranged
+from measure.features.board import BoardTool
 from measure.features.layout import Layout, layout_of
 from measure.features.rims import circle_response, tells_errors
 from measure.features.shape import prepared, torn
@@ -170,6 +171,8 @@ def _responses(
             told = _none(circle.errors.shape[1], clean.size)
         parts.append(told)
     parts.append(sparse.csr_array((len(found.forms), clean.size)))  # an extreme has none: its variance is its law's
+    if found.board is not None:
+        parts.append(BoardTool(picture, found.known.placing.board).response(clean))
     rows = sparse.vstack(parts, format="csr")  # few of the pixels of a large image
     lost = np.array([not np.isfinite(rows.data[start:stop]).all() for start, stop in pairwise(rows.indptr)], bool)
     rows.data[np.repeat(lost, np.diff(rows.indptr))] = 0.0

@@ -16,6 +16,7 @@ from imaging.geometry.lens import image_centre
 from imaging.models.extremes import extremes_of, with_extremes
 from imaging.pictures import Pictures
 from measure.covariances import spread
+from measure.features.board import FoundBoard, find_board
 from measure.features.corners import intersect
 from measure.features.forms import Forms, find_form
 from measure.features.found import MIN_SINE, Shape
@@ -54,6 +55,8 @@ class MeasuredFeatures:
         Joint covariance of lines and circles; those of different circles, and of circles and lines, count as
         independent, for they are found from different pixels.
     status : ndarray of str, shape (n, M)
+    board : FoundBoard, optional
+        What stands beside the part and tells where it lies.
     """
 
     known: Measurands
@@ -63,6 +66,7 @@ class MeasuredFeatures:
     seen: Seen
     errors: np.ndarray
     status: np.ndarray
+    board: FoundBoard | None = None
 
     @cached_property
     def image(self) -> Values:
@@ -99,6 +103,8 @@ class MeasuredFeatures:
         lost[:, : 2 * edges] = np.repeat(~good[:, :edges], 2, 1)
         for c in range(len(self.circles)):
             lost[:, self.seen.numbers(c)] = ~good[:, edges + c, None]
+        if self.board is not None:
+            lost[:, self.seen.of_board] = ~np.isin(self.board.state, status.MEASURED)[:, None]
         return np.where(lost[:, :, None] & np.eye(self.seen.count, dtype=bool), np.inf, self.errors)
 
     @cached_property
@@ -116,7 +122,8 @@ class MeasuredFeatures:
 
     @cached_property
     def offsets(self) -> np.ndarray:
-        """How far off the expected ones lines and circles are found, (n, q), numbered as in `Seen`; 0 of forms."""
+        """How far off the expected ones lines, circles and a board are found, (n, q), numbered as in `Seen`; 0 of
+        forms."""
         expected, found = self.known.seen, np.zeros((len(self.status), self.seen.count))
         normal, edges = unit_normals(self.seen.along), 2 * len(self.names)
         along = np.einsum("nei,ei->ne", normal, expected.normals)
@@ -125,6 +132,8 @@ class MeasuredFeatures:
         found[:, 0:edges:2], found[:, 1:edges:2] = off / along, np.arctan2(sine, along)
         for c, circle in enumerate(self.circles):
             found[:, expected.numbers(c)] = circle.errors
+        if self.board is not None:
+            found[:, expected.of_board] = self.board.offsets
         return found
 
     @property
@@ -169,6 +178,8 @@ def find(
         quantity: find_form(images, picture, quantity, shape, by_name, noiseless=noiseless)
         for quantity in known.seen.forms
     }
+    told = known.placing and known.placing.board
+    board = find_board(images, picture, told) if told else None
     sizes = {quantity: form.size for quantity, form in forms.items()}
     seen = found_in_images(known, layout, shape.normals, shape.points, tuple(c.errors for c in circles), sizes)
     found = MeasuredFeatures(
@@ -177,8 +188,9 @@ def find(
         circles=circles,
         forms=forms,
         seen=seen,
-        errors=_errors(shape, circles, forms, known.seen),
+        errors=_errors(shape, circles, forms, board, known.seen),
         status=_states(known, shape, circles, forms),
+        board=board,
     )
     return found if found.adjustment is None else replace(found, status=_placed_states(found))
 
@@ -192,6 +204,8 @@ def _placed_states(found: MeasuredFeatures) -> np.ndarray:
     untold = (
         found.adjustment.matters(found.at_known.gradient, variances, quantities) if placing.features else ~fits[:, None]
     )
+    if found.board is not None:
+        fits = fits & (found.board.state != status.MISFIT)
     said = np.where(untold, status.UNPLACED, np.where(fits[:, None], status.OK, status.MISFIT))
     pairs = zip(found.status.ravel(), np.broadcast_to(said, found.status.shape).ravel(), strict=True)
     return np.array([status.worst(*pair) for pair in pairs]).reshape(found.status.shape)
@@ -226,6 +240,7 @@ def found_in_images(
         half_angles=_added(expected.half_angles, [errors[:, 3:].sum(1) for errors in circle_errors], count),
         expected=False,
         forms=forms,
+        board=expected.board,
     )
 
 
@@ -250,7 +265,9 @@ def values(seen: Seen, quantities: tuple[Quantity, ...], kind, errors: np.ndarra
         return Values(value, gradient, covariance)
 
 
-def _errors(shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Forms], seen: Seen) -> np.ndarray:
+def _errors(
+    shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Forms], board: FoundBoard | None, seen: Seen
+) -> np.ndarray:
     count, edges = len(shape.lines), shape.lines.shape[-1]
     whole = np.zeros((count, seen.count, seen.count))
     whole[:, :edges, :edges] = shape.lines
@@ -259,6 +276,8 @@ def _errors(shape: Shape, circles: tuple[Circles, ...], forms: dict[Quantity, Fo
         whole[:, part, part] = circle.covariance
     for k, form in enumerate(forms.values(), seen.of_forms.start):
         whole[:, k, k] = form.variance
+    if board is not None:
+        whole[:, seen.of_board, seen.of_board] = board.covariance
     return whole
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from imaging.features.projected_edges import circles
+from measure.features.board import board_pixels
 from measure.features.layout import layout_of
 from measure.features.rims import rim_tool, unmoved
 from measure.features.shape import prepared
@@ -36,7 +37,7 @@ def region_of_interest(
     for name in estimators:
         check_method(name, None)
     layout = layout_of(picture)
-    used = np.zeros(layout.optics.shape, bool)
+    used = board_pixels(picture)
     for name in circles(picture.scene):
         used.flat[rim_tool(picture, name, unmoved(picture, name)).locator.pixels] = True
     for name in estimators if layout.names else ():

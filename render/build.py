@@ -12,6 +12,7 @@ from imaging.light.appearance import analyser_axis
 from imaging.light.irradiance import bands
 from imaging.light.sheets import sheets
 from render import bsdf, lights
+from render.board import board_shapes
 from render.curved import curved_shapes, stands_for
 from render.meshes import mesh
 from render.parts import Part
@@ -65,9 +66,11 @@ def description(
     else:
         made = [shape for faces in textures for shape in shapes(mitsuba, faces)]
     parts.update((f"part{i}", shape) for i, shape in enumerate(made))
+    passed = 0.0 if part.silhouette else 0.5 if "analyser" in active else 1.0
+    parts.update(board_shapes(mitsuba, picture, passed))
     if "floor" in active:
         floor = scene.floor or Floor(reflectance=0.0, height=_lowest(scene))
-        parts["floor"] = _floor(mitsuba, floor, 0.0 if part.silhouette else 0.5 if "analyser" in active else 1.0)
+        parts["floor"] = _floor(mitsuba, floor, passed)
     return parts
 
 

@@ -34,7 +34,9 @@ from scenes import Picture
 _NEAR = 16  # rays of a fine pixel beside an edge, where what is random is faint
 
 
-def fine_image(part: Part, crop: tuple[slice, slice], quality: Quality, variant: str) -> np.ndarray:
+def fine_image(
+    part: Part, crop: tuple[slice, slice], quality: Quality, variant: str, *, evenly: bool = False
+) -> np.ndarray:
     """Image of a part's fine pixels.
 
     Parameters
@@ -45,6 +47,8 @@ def fine_image(part: Part, crop: tuple[slice, slice], quality: Quality, variant:
     quality : Quality
     variant : str
         Mitsuba variant.
+    evenly : bool
+        Whether all edges get the same rays, also in large images, whatever is measured.
 
     Returns
     -------
@@ -52,7 +56,7 @@ def fine_image(part: Part, crop: tuple[slice, slice], quality: Quality, variant:
         Grey levels above the black level.
     """
     tracer = _Tracer(part, crop, quality, variants.use(variant), variant.startswith("scalar"))
-    return tracer.large() if tracer.is_large else tracer.small()
+    return tracer.large() if tracer.is_large and not evenly else tracer.small()
 
 
 def defocus(picture: Picture) -> float:

@@ -11,6 +11,7 @@ from imaging.geometry.lens import recorded
 from imaging.geometry.projection import project_ideal
 from imaging.light.backlight import backlights
 from render import variant as variants
+from render.board import board_window, is_board
 from render.fine import defocus, fine_image
 from render.optics import blur_and_bin, lens_alone
 from render.parts import parts, within_cone
@@ -62,21 +63,41 @@ def image(
     if not picture.lights:
         raise InvalidInput("light must be a pose, got nothing")
     chosen = choose(picture.scene, effects, tolerance, picture)
-    picture, camera, k = picture.with_scene(chosen.scene), chosen.scene.camera, quality.supersample
+    picture, camera = picture.with_scene(chosen.scene), chosen.scene.camera
     levels = np.full((camera.height, camera.width), chosen.scene.noise.dark_level)
-    rows, columns = window(picture)
-    if levels[rows, columns].size:
-        check_precision(camera)
-        crop = tuple(slice(part.start * k, part.stop * k) for part in (rows, columns))
-        which, start = variant or variants.choose(), (crop[1].start, crop[0].start)
-        for part in parts(picture.with_scene(DIMMED.without(chosen.scene)), chosen.active):  # rays know of no lens
-            fine = fine_image(part, crop, quality, which)
-            if part.silhouette:
-                fine = np.where(within_cone(part.picture, crop, k), fine, 0.0)
-            levels[rows, columns] += blur_and_bin(fine, lens_alone(picture.scene), k, start)
+    which, beside = variant or variants.choose(), board_window(picture)
+    where = window(picture)
+    if levels[where].size:
+        levels[where] += _seen(picture, chosen.active, where, quality, which)
+    if beside is not None:
+        there = is_board(picture, beside)
+        dark = chosen.scene.noise.dark_level
+        levels[beside][there] = dark + _seen(picture, chosen.active, beside, quality, which, evenly=True)[there]
     for name in sorted(chosen.active):
         levels = EFFECTS[name].seen(levels, picture)
     return levels
+
+
+def _seen(
+    picture: Picture,
+    active: frozenset[str],
+    where: tuple[slice, slice],
+    quality: Quality,
+    which: str,
+    *,
+    evenly: bool = False,
+) -> np.ndarray:
+    """Signal in rows and columns of the image, before what effects add to recorded levels."""
+    check_precision(picture.scene.camera)
+    k = quality.supersample
+    crop = tuple(slice(part.start * k, part.stop * k) for part in where)
+    start, found = (crop[1].start, crop[0].start), np.zeros(1)
+    for part in parts(picture.with_scene(DIMMED.without(picture.scene)), active):  # rays know of no lens
+        fine = fine_image(part, crop, quality, which, evenly=evenly)
+        if part.silhouette:
+            fine = np.where(within_cone(part.picture, crop, k), fine, 0.0)
+        found = found + blur_and_bin(fine, lens_alone(picture.scene), k, start)
+    return found
 
 
 def window(picture: Picture) -> tuple[slice, slice]:

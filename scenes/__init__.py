@@ -1,5 +1,6 @@
 """What is to be measured, with what: object, material, camera, light, noise, task and poses."""
 
+from scenes.board import Board
 from scenes.cameras.lens import Lens
 from scenes.cameras.noise import Noise
 from scenes.cameras.pinhole import Camera
@@ -30,9 +31,9 @@ from scenes.uncertainty import Uncertainty
 from scenes.units import UNITS, Unit
 
 __all__ = [
-    "UNITS", "AnyLight", "Backlight", "Ball", "Bar", "Block", "Brdf", "Camera", "Centre", "Circle", "Corner", "Curved",
-    "Disc", "Dome", "Edge", "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter", "Lamp",
-    "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture",
+    "UNITS", "AnyLight", "Backlight", "Ball", "Bar", "Block", "Board", "Brdf", "Camera", "Centre", "Circle", "Corner",
+    "Curved", "Disc", "Dome", "Edge", "FaceMaterial", "Filter", "Floor", "ImageTexture", "InvalidInput", "Jitter",
+    "Lamp", "Lens", "Light", "Locator", "Luminaire", "Material", "Measurand", "Mesh", "Noise", "Obstacle", "Picture",
     "Pose", "Quantity", "Ring", "Scene", "Setting", "Side", "Solid", "StatisticalTexture", "Step", "Task",
     "Telecentric", "Tolerance", "Turned", "Uncertain", "UncertainNumber", "Uncertainty", "Unit", "Wall", "as_point",
     "block", "find", "load", "mounted", "names", "pairs", "several", "shown",

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from scenes.cameras.pinhole import Camera
     from scenes.scene import Scene
 
-ROOTS = ("camera", "light", "lights", "material", "noise", "floor")
+ROOTS = ("camera", "light", "lights", "material", "noise", "floor", "placement")
 """Tables of a scene whose numbers may be uncertain."""
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
 _MOVING = ("motion", "line_time_us")

@@ -1,4 +1,5 @@
-"""How the part's place is known: from a fixture alone, or found in the same picture by features of the part."""
+"""How the part's place is known: from a fixture alone, or found in the same picture by features of the part or a
+board."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from scenes.board import PITCH, Board
 from scenes.measurands.features import Centre, Side, Wall
 from scenes.measurands.form import forms_of
 from scenes.measurands.kinds import MEASURANDS
@@ -34,15 +36,18 @@ class Placement(Model):
 
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True, serialize_by_alias=True)
 
-    source: Literal["known", "uncertain", "datums"] = Field("known", alias="from")
+    source: Literal["known", "uncertain", "datums", "board"] = Field("known", alias="from")
     """known: it lies as the scene says, and what that is not sure of is a source of the budget. uncertain: the same,
     and plans and measurements count it too. datums: shift and tilt are estimated in the picture, together with the
-    measurands, from features of the part of which the model tells the places."""
+    measurands, from features of the part of which the model tells the places. board: the same from a board that is
+    seen beside the part and lies as it does."""
     datums: tuple[Name, ...] = ()
     """Names of the part's straight edges and circles that tell where it lies; measurands may use them too."""
     datum_sd: Spread | None = None
     """Standard uncertainty of their places and radii on the part, each end and each direction independently: what the
     manufacture leaves open [length]."""
+    board: Board | None = None
+    """What stands beside the part; ``uncertainty.board_shift`` and ``board_tilt_deg`` say how exactly."""
     expected: tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate] = (0.0,) * 6
     """Shift along x, y, z [length] and rotation vector [degrees] that are expected, beside where the scene says."""
 
@@ -54,12 +59,17 @@ class Placement(Model):
     @property
     def is_estimated(self) -> bool:
         """Whether the picture tells it."""
-        return self.source == "datums"
+        return self.source in ("datums", "board")
 
     @property
     def features(self) -> tuple[str, ...]:
         """Names of the datums, each once."""
         return tuple(dict.fromkeys(self.datums))
+
+    @property
+    def told_by(self) -> tuple[str, ...]:
+        """Names of what tells the place in the picture: the datums, or the board."""
+        return self.features if self.board is None else ("board",)
 
 
 def prior(uncertainty: Uncertainty) -> np.ndarray:
@@ -70,6 +80,11 @@ def prior(uncertainty: Uncertainty) -> np.ndarray:
     [1.0, 2.0, 3.0, 0.0, 0.0, 0.0]
     """
     return np.array([0.0 if told is None else told.u for told in uncertainty.of_part])
+
+
+def of_board(uncertainty: Uncertainty) -> np.ndarray:
+    """Standard uncertainties (6,) of the board's place relative to the part, in the same components."""
+    return np.array([0.0 if told is None else told.u for told in uncertainty.of_board])
 
 
 def limits(uncertainty: Uncertainty) -> np.ndarray:
@@ -87,10 +102,16 @@ def check_placement(scene: Scene) -> None:
         If not.
     """
     placement = scene.placement
-    if not placement.is_estimated:
-        for key in ("datums", "datum_sd"):
-            if getattr(placement, key):
-                raise ValueError(f"placement.{key} must be left out unless placement.from is datums, got it")
+    for key, source in (("datums", "datums"), ("datum_sd", "datums"), ("board", "board")):
+        if getattr(placement, key) and placement.source != source:
+            raise ValueError(f"placement.{key} must be left out unless placement.from is {source}, got it")
+    told = [each.key for each in scene.uncertain if each.key.startswith("placement.") and each.key != PITCH]
+    if told:
+        raise ValueError(f"uncertain.key must be {PITCH} of a placement, got {told[0]!r}")
+    if placement.source != "board" and of_board(scene.uncertainty).any():
+        raise ValueError(
+            "uncertainty.board_shift and board_tilt_deg must be left out unless placement.from is board, got some"
+        )
     if placement.is_known:
         if any(placement.expected):
             raise ValueError(f"placement.expected must be 0 where it is known, got {list(placement.expected)}")
@@ -102,7 +123,11 @@ def check_placement(scene: Scene) -> None:
         )
     _check_scene(scene)
     if placement.is_estimated:
+        _check_tilts(scene)
+    if placement.source == "datums":
         _check_datums(scene)
+    if placement.source == "board":
+        _check_board(scene)
 
 
 def _check_scene(scene: Scene) -> None:
@@ -126,14 +151,31 @@ def _check_datums(scene: Scene) -> None:
         raise ValueError("placement.datums must be at least one edge or circle, got none")
     if placement.datum_sd is None:
         raise ValueError("placement.datum_sd must be given with datums, got nothing")
-    if np.sort(limits(scene.uncertainty)[3:])[1] > MOST_TILT:
-        raise ValueError(
-            f"uncertainty.part_tilt_deg must be limited to {MOST_TILT:g} degrees about two axes for datums, got more"
-        )
     edges, rims = [edge.name for edge in solid.sharp], [each.name for each in solid.rims]
     for name in placement.datums:
         if name not in edges and name not in rims:
             raise ValueError(f"placement.datums must be edges or circles of the part, got {name!r}")
+
+
+def _check_tilts(scene: Scene) -> None:
+    if np.sort(limits(scene.uncertainty)[3:])[1] > MOST_TILT:
+        raise ValueError(
+            f"uncertainty.part_tilt_deg must be limited to {MOST_TILT:g} degrees about two axes for "
+            f"{scene.placement.source}, got more"
+        )
+
+
+def _check_board(scene: Scene) -> None:
+    board, noise = scene.placement.board, scene.noise
+    if board is None:
+        raise ValueError("placement.board must be given with placement.from = 'board', got nothing")
+    if limits(scene.uncertainty)[3:].max() > MOST_TILT:
+        raise ValueError(f"uncertainty.part_tilt_deg must be limited to {MOST_TILT:g} degrees for a board, got more")
+    if noise.is_shared or noise.colour is not None:
+        raise ValueError("noise must be without row_sigma, column_sigma and colour with a board, got some")
+    inside = [scene.solid.height_above(point) <= 0 for point in board.outline]
+    if any(inside):
+        raise ValueError("placement.board must be outside the object, got it within")
 
 
 def datums_of(scene: Scene) -> tuple[Side | Centre, ...]:

@@ -43,6 +43,11 @@ _SAME = {
 _WITH_VALUE = ("temperature_K", "expansion_per_K")
 
 
+def _of_axes(*both: Uncertain | tuple[Uncertain, ...] | None) -> tuple[Uncertain | None, ...]:
+    """Of shifts along x, y and z, and of turns about them."""
+    return tuple(each for told in both for each in (told if isinstance(told, tuple) else (told,) * 3))
+
+
 class Uncertainty(Model):
     """Standard uncertainties of what is no number of the scene; a number alone is one, a table says more.
 
@@ -62,6 +67,10 @@ class Uncertainty(Model):
     """Of the part's place, along x, y and z independently; of each its own in a list of three [length]."""
     part_tilt_deg: Deviations = None
     """Of its turns about axes through ``look_at`` along x, y and z, independently; of each in a list [degrees]."""
+    board_shift: Deviations = None
+    """Of the place of ``placement.board`` relative to the part, along x, y and z, as ``part_shift`` [length]."""
+    board_tilt_deg: Deviations = None
+    """Of its turns relative to the part about axes through ``look_at``, as ``part_tilt_deg`` [degrees]."""
     principal_point_px: Deviation = None
     """Of the place at which the optical axis meets the sensor, along x and y independently [px]."""
     temperature_K: Deviation = None  # noqa: N815 - the unit
@@ -92,8 +101,12 @@ class Uncertainty(Model):
     @property
     def of_part(self) -> tuple[Uncertain | None, ...]:
         """How well the part's place is known: shifts along x, y and z, and turns about them; None: it is exact."""
-        pairs = (self.part_shift, self.part_tilt_deg)
-        return tuple(each for told in pairs for each in (told if isinstance(told, tuple) else (told,) * 3))
+        return _of_axes(self.part_shift, self.part_tilt_deg)
+
+    @property
+    def of_board(self) -> tuple[Uncertain | None, ...]:
+        """The same of the board's place relative to the part."""
+        return _of_axes(self.board_shift, self.board_tilt_deg)
 
     @model_validator(mode="after")
     def _deviations(self) -> Uncertainty:

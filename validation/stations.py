@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from imaging.blurred.arrangement import arrangement_of
+from imaging.blurred.board import add_board
 from imaging.blurred.model import BlurredModel
 from imaging.geometry.lens import undistorted
 from imaging.light.appearance import is_plain
@@ -34,7 +35,9 @@ def clean_image(station: Station) -> np.ndarray:
     there = replace(there, vertices=undistorted(station.record(scene.bodies.vertices), camera))
     y, x = (part.ravel() for part in np.mgrid[: camera.height, : camera.width])
     model = BlurredModel(there, x, y, np.arange(0))
-    return model.image(model.start()).reshape(camera.height, camera.width) + scene.noise.dark_level
+    image = model.image(model.start()).reshape(camera.height, camera.width) + scene.noise.dark_level
+    add_board(image, station.pictures, lambda points: undistorted(station.record(station.board_at(points)), camera))
+    return image
 
 
 def exposed(stations: Iterable[Station], rng: np.random.Generator) -> np.ndarray:

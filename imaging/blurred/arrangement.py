@@ -213,11 +213,11 @@ def _arrangement(pictures: Pictures) -> Arrangement:
         edges=np.array(owners, int),
         corners=np.array(vertices, int),
         camera=camera if camera.lens.bends or camera.aperture_radius > 0 or camera.blur_field is not None else None,
-        blur_px=_blur_along(image[np.array([edge.ends for edge in required], int).reshape(-1, 2)], camera),
+        blur_px=along_blur(image[np.array([edge.ends for edge in required], int).reshape(-1, 2)], camera),
     )
 
 
-def _blur_along(ends: np.ndarray, camera: Camera) -> float:
+def along_blur(ends: np.ndarray, camera: Camera) -> float:
     """The blur in focus along lines between ideal places (E, 2, 2): the root of its mean square, px."""
     if camera.blur_field is None or not np.isfinite(ends).all((1, 2)).any():
         return camera.blur_px

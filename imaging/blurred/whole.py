@@ -1,4 +1,4 @@
-"""The whole picture without the renderer: one convex body before darkness, exactly blurred."""
+"""The whole picture without the renderer: one convex body before darkness, and a board beside it, exactly blurred."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from imaging.blurred.arrangement import arrangement_of
+from imaging.blurred.board import add_board
 from imaging.blurred.model import BlurredModel
 from imaging.light.appearance import is_plain
 from imaging.pictures import Pictures
@@ -52,6 +53,7 @@ def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.n
     for top in range(0, camera.height, rows):
         y, x = np.mgrid[top : min(top + rows, camera.height), : camera.width]
         found[top : top + rows] = signal_at(Pictures.of(picture), x.ravel(), y.ravel()).reshape(x.shape)
+    add_board(found, Pictures.of(picture))
     return found + picture.scene.noise.dark_level
 
 

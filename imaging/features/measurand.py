@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 
+from imaging.boards.seen import seen_board
 from imaging.features.kinds import Evaluated, in_image, on_plane
 from imaging.features.placing import Placing
 from imaging.features.projected_edges import ProjectedEdges, circles, corner_features, projected_edges
@@ -23,6 +24,7 @@ from imaging.pictures import Pictures
 from scenes import Centre, Corner, Quantity, Scene, Task
 from scenes.measurands.features import is_line
 from scenes.measurands.form import forms_of
+from scenes.placement import prior
 
 __all__ = ["Measurand", "Measurands", "corner_response", "measurand", "measurands", "normals", "required_edges"]
 
@@ -56,7 +58,7 @@ class Measurands:
 
     @property
     def datums(self) -> tuple[str, ...]:
-        """Names of the features that tell where the part lies."""
+        """Names of what tells where the part lies: features of the part, or the board beside it."""
         return () if self.placing is None else self.placing.features
 
     @property
@@ -151,7 +153,8 @@ def measurand(pictures: Pictures, number: int = 0) -> Measurand:
 def _measurands(pictures: Pictures) -> Measurands:
     view = projected_edges(pictures)
     seen = expected(pictures, view)
-    return Measurands(pictures.scene.quantities, view, seen, Placing.of(pictures.scene, seen))
+    placing = Placing.of(pictures.scene, seen, seen_board(pictures, seen))
+    return Measurands(pictures.scene.quantities, view, seen, placing)
 
 
 def dense(found: list[Evaluated], lead: tuple[int, ...], count: int) -> np.ndarray:
@@ -186,6 +189,7 @@ def expected(pictures: Pictures, view: ProjectedEdges) -> Seen:
         half_angles=np.broadcast_to(np.array([half_angle_of(rim) for rim in rims]), (*lead, len(rims))),
         expected=True,
         forms={quantity: np.zeros(lead) for quantity in forms_of(scene.quantities)},
+        board=0 if scene.placement.board is None else int((prior(scene.uncertainty) > 0).sum()),
     )
 
 

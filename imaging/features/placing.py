@@ -1,5 +1,7 @@
 """A part's place as an unknown: what it does to lines and circles, and the adjustment that finds it from datums.
 
+Datums are features of the part, or a board beside it, which counts as one feature (`imaging.boards.seen`).
+
 Found features y are J p + d + e: J their derivative by the placement p (shift and rotation vector of the part), d what
 the datums are off on the part, e noise. Of all p the most likely one given the datums' y, and what is known of p
 before (maximum a posteriori, Gauss-Markov), is taken off what is seen of all features; a measurand is then of these.
@@ -10,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +21,9 @@ from scenes import Circle, Quantity, Scene, Side
 from scenes.measurands.features import ends_of
 from scenes.placement import COMPONENTS, datums_of, prior
 from scenes.status import OF_SIGMA, OF_TOLERANCE
+
+if TYPE_CHECKING:
+    from imaging.boards.seen import SeenBoard
 
 _AROUND = 64  # points of a circle
 _NOISELESS = 1e-4  # of a feature's variance, in a combination of some; what is told of a placement has 3e-3 and more
@@ -38,11 +44,15 @@ class Placing:
     slopes : ndarray, shape (..., q, k)
         J, by the components in units of those.
     features : tuple of str
-        The datums' names.
+        Names of the datums, or of the board.
     datums : ndarray of bool, shape (q,)
         Which parameters of `Seen` are those of datums.
     scatter : ndarray, shape (..., q, q)
-        Covariance of what the datums are off on the part, in the same parameters.
+        Covariance of what the datums are off on the part, or a board's points on it, in the same parameters.
+    beside : ndarray, shape (..., q, q)
+        The same by what is not known of a board's place relative to the part and of its pitch.
+    board : SeenBoard, optional
+        What stands beside the part and tells where it lies.
     """
 
     names: tuple[str, ...]
@@ -52,10 +62,12 @@ class Placing:
     features: tuple[str, ...]
     datums: np.ndarray
     scatter: np.ndarray
+    beside: np.ndarray
+    board: SeenBoard | None = None
 
     @classmethod
-    def of(cls, scene: Scene, seen: Seen) -> Placing | None:
-        """That of a scene's features as they are expected; None where their place is known."""
+    def of(cls, scene: Scene, seen: Seen, board: SeenBoard | None = None) -> Placing | None:
+        """That of a scene's features, and its board's points, as they are expected; None where their place is known."""
         if scene.placement.is_known:
             return None
         u = prior(scene.uncertainty)
@@ -64,9 +76,18 @@ class Placing:
         with np.errstate(divide="ignore", invalid="ignore"):
             slopes = _slopes(seen)[..., free] * steps[free]
             datums, scatter = _datums(scene, seen)
+        lead = (
+            slopes.shape[:-2] if board is None else board.root.shape[:-2]
+        )  # a board's noise depends on the lights, too
+        slopes, scatter = (np.broadcast_to(each, (*lead, *each.shape[-2:])).copy() for each in (slopes, scatter))
+        beside = np.zeros(scatter.shape)
+        if board is not None:
+            part = seen.of_board
+            slopes[..., part, :], datums[part] = board.root, True
+            scatter[..., part, part], beside[..., part, part] = board.spread(board.printed), board.of_beside
         expected = np.array(scene.placement.expected)[free] / u[free]
         names = tuple(COMPONENTS[i] for i in free)
-        return cls(names, u[free], expected, slopes, scene.placement.features, datums, scatter)
+        return cls(names, u[free], expected, slopes, scene.placement.told_by, datums, scatter, beside, board)
 
     def squares(self, errors: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Chi-square (...) of what the best placement leaves of features found (..., q), and degrees of freedom."""
@@ -95,7 +116,7 @@ class Placing:
         noise has turned the lines, and are left out as rows of zeros.
         """
         told = self.datums & np.isfinite(np.einsum("...qq->...q", errors)) & np.isfinite(self.slopes).all(-1)
-        whole = np.where(told[..., :, None] & told[..., None, :], errors + self.scatter, 0.0)
+        whole = np.where(told[..., :, None] & told[..., None, :], errors + self.scatter + self.beside, 0.0)
         size = np.sqrt(np.einsum("...qq->...q", whole))
         size = np.where(size > 0, size, 1.0)
         values, vectors = np.linalg.eigh(whole / (size[..., :, None] * size[..., None, :]))
@@ -145,21 +166,25 @@ class Adjustment:
         return gradient @ slopes
 
     def placed(self, gradient: np.ndarray) -> np.ndarray:
-        """Covariance (..., M, M) of values by what is not known of the placement and of the datums on the part.
+        """Covariance (..., M, M) of values by what is not known of the placement, of the datums on the part, and of the
+        place of a board beside it.
 
         ``gradient`` (..., M, q) is that at a known placement.
         """
         left = self.left(gradient)
-        return left @ np.swapaxes(left, -1, -2) + self.by_datums(gradient)
+        return left @ np.swapaxes(left, -1, -2) + self._moved(gradient, self.placing.scatter + self.placing.beside)
 
     def left(self, gradient: np.ndarray) -> np.ndarray:
         """Derivatives (..., M, k) of adjusted values by the placement: what the datums' gain leaves of `pulls`."""
         return self.pulls(gradient) @ self.posterior
 
     def by_datums(self, gradient: np.ndarray) -> np.ndarray:
-        """The part of `placed` by what the datums are off on the part."""
+        """The part of `placed` by what the datums are off on the part, or a board's points on it."""
+        return self._moved(gradient, self.placing.scatter)
+
+    def _moved(self, gradient: np.ndarray, scatter: np.ndarray) -> np.ndarray:
         moved = self.pulls(gradient) @ self.gain
-        return moved @ np.nan_to_num(self.placing.scatter) @ np.swapaxes(moved, -1, -2)
+        return moved @ np.nan_to_num(scatter) @ np.swapaxes(moved, -1, -2)
 
     @cached_property
     def _directions(self) -> tuple[np.ndarray, np.ndarray]:

@@ -4,9 +4,10 @@ The state of a picture is small errors of what was found: of each edge's line th
 at the edge's first end and the rotation theta (rad); of each circle two shifts of its centre in its plane and the
 change of its radius (the scene's unit); of each curved surface, which counts as a circle, the three of
 `Curved.parameters`, of a cone four; of each form (`scenes.measurands.form`) its size, which is found from points that
-no line or circle stands for (the scene's unit). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then
-the circles (`Seen.numbers`), then the forms. Image coordinates are ideal px from the image's middle, in which lines are
-straight.
+no line or circle stands for (the scene's unit); of a board beside the part the numbers that tell its place
+(`imaging.boards.seen`). They are numbered in that order: 2 e, 2 e + 1 for the edge e of E, then the circles
+(`Seen.numbers`), then the forms, then the board's. Image coordinates are ideal px from the image's middle, in which
+lines are straight.
 """
 
 from __future__ import annotations
@@ -52,6 +53,8 @@ class Seen:
         Whether this is the object itself, whose points need not be sought along the rays.
     forms : dict
         Size (...) of the zone of each `Quantity` that is a form, the scene's unit: 0 of the object itself.
+    board : int
+        How many parameters a board beside the part has.
     """
 
     solid: Solid
@@ -67,16 +70,23 @@ class Seen:
     half_angles: np.ndarray
     expected: bool
     forms: Mapping[Quantity, np.ndarray] = field(default_factory=dict)
+    board: int = 0
 
     @property
     def count(self) -> int:
         """Number of parameters, q."""
-        return 2 * len(self.names) + sum(self.sizes) + len(self.forms)
+        return self.of_forms.stop + self.board
 
     @property
     def of_forms(self) -> slice:
         """Which parameters are the forms'."""
-        return slice(self.count - len(self.forms), self.count)
+        first = 2 * len(self.names) + sum(self.sizes)
+        return slice(first, first + len(self.forms))
+
+    @property
+    def of_board(self) -> slice:
+        """Which parameters are the board's."""
+        return slice(self.count - self.board, self.count)
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:

@@ -14,6 +14,7 @@ from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from imaging.blurred.arrangement import arrangement_of, near_pixels, near_vertices
 from imaging.blurred.model import BlurredModel, State
@@ -232,11 +233,22 @@ def _one(
     hidden = np.logical_or(*(part[:, ~seen].any(-1) for part in known.of_lines(known.gradient)))
     plane = known.gradient_object
     if known.placing is not None:
+        joint = _with_board(joint, known)
         found = np.where(np.repeat(seen, 2), 0.0, np.inf)
-        plane = known.placing.adjusted(joint + np.diag(found)).gradient(plane)
+        plane = known.placing.adjusted(joint + np.diag(_padded(found, known))).gradient(plane)
     variances = (np.einsum("mi,ij,mj->m", each, joint, each) for each in (known.gradient, plane))
     image, plane = (np.where(hidden, np.inf, each) for each in variances)
     return np.where(seen[:, None, None], lines, np.inf), image, plane
+
+
+def _with_board(joint: np.ndarray, known: Measurands) -> np.ndarray:
+    """Covariance of lines with that of a board's parameters, whose points count as they are fitted."""
+    board = None if known.placing is None else known.placing.board
+    return joint if board is None else block_diag(joint, board.spread(board.noise))
+
+
+def _padded(of_lines: np.ndarray, known: Measurands) -> np.ndarray:
+    return np.concatenate([of_lines, np.zeros(known.seen.board)])
 
 
 def line_rows(known: Measurands, required: np.ndarray, count: int) -> np.ndarray:

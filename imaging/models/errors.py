@@ -111,7 +111,20 @@ class Errors:
             whole[..., 2 * e, 2 * e + 1] = whole[..., 2 * e + 1, 2 * e] = mixed
         for c, covariance in enumerate(self.circles):
             whole[..., known.seen.numbers(c), known.seen.numbers(c)] = covariance
+        whole[..., known.seen.of_board, known.seen.of_board] = self._of_board
         return whole
+
+    @cached_property
+    def _of_board(self) -> np.ndarray:
+        """Covariance (..., k, k) of a board's parameters by noise."""
+        placing = self.measurands.placing
+        board = None if placing is None else placing.board
+        return np.zeros((0, 0)) if board is None else board.spread(board.noise)
+
+    def by_board(self, gradient: np.ndarray) -> np.ndarray:
+        """Variance (...) that a board's noise adds to what has a gradient (..., q)."""
+        pull = gradient[..., self.measurands.seen.of_board]
+        return np.einsum("...i,...ij,...j->...", pull, self._of_board, pull) if pull.shape[-1] else np.zeros(())
 
     @property
     def variance(self) -> np.ndarray:
@@ -134,7 +147,9 @@ class Errors:
         names = [*self.measurands.view.names, *self.measurands.circles]
         each = [*np.moveaxis(edges, -1, 0), *circles]
         datums = self.measurands.datums
-        return {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed or name in datums}
+        found = {name: part for name, part, needed in zip(names, each, needs, strict=True) if needed or name in datums}
+        board = {name: self.by_board(self.gradient_object[..., number, :]) for name in datums if name not in names}
+        return found | board
 
     def jointly(self, *, in_object: bool) -> np.ndarray:
         """Joint covariance (M, M) of all quantities of one picture in the object or in the image, extremes by their
@@ -210,7 +225,7 @@ def _variance(errors: Errors, gradient: np.ndarray, needs: np.ndarray | None = N
     edges, circles = _parts(errors, gradient, needs)
     with np.errstate(invalid="ignore", over="ignore"):
         variance = edges.sum(-1)
-        for each in circles:
+        for each in (*circles, errors.by_board(gradient)):
             variance = variance + each
     return np.where(np.isfinite(variance), variance, np.inf)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from measure.boards.windows import steps
+from imaging.boards.windows import steps
 
 _DEGREES = ((3, 14), (2, 8))  # of the polynomial, and the corners that it takes
 

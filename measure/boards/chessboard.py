@@ -9,10 +9,10 @@ import numpy as np
 from scipy import sparse
 from scipy.special import chdtrc
 
+from imaging.boards.fitting import Crossings, crossing_rows, fit_crossings
+from imaging.boards.windows import steps, windows
 from measure.boards.approximate import approximate_corners
 from measure.boards.bend import bends
-from measure.boards.fitting import Crossings, crossing_rows, fit_crossings
-from measure.boards.windows import steps, windows
 from measure.photo.noise import noise_sigma
 from scenes import status
 from scenes.arrays import BRIGHTEST, picture

@@ -7,10 +7,11 @@ from typing import Any
 
 import cv2
 import numpy as np
+from scipy import sparse
 from scipy.special import chdtrc
 
+from imaging.boards.dot_fitting import dot_reach, dot_rows, fit_dots
 from measure.boards.chessboard import Board, check_noise, check_shape
-from measure.boards.dot_fitting import fit_dots
 from measure.photo.noise import noise_sigma
 from scenes import status
 from scenes.arrays import picture
@@ -20,8 +21,6 @@ _LEAST_AREA, _FEWEST = 12.0, 9  # px^2 of a dot, and how many make a grid
 _ALIKE = 0.5, 2.0  # area of a dot over the median of its grid's
 _FILLED = 0.85  # part of its ellipse that a blot fills at least, and the other way round
 _NEAR = 0.3  # of the way to the next dot: where it is expected
-_LOOKED_AT = 0.4  # of what is between a dot and the next
-_FARTHEST = 6.0  # px beside a dot that are looked at
 _LEAST_GAP = 1.5  # px beside a dot that have to be seen
 _FAINTEST = 3.0  # times the noise: the contrast of a dot
 _ROUNDING = 1 / 12
@@ -62,7 +61,7 @@ def dot_grid(image: Any, shape: tuple[int, int] | None = None, noise: float | No
             raise InvalidInput(
                 f"image must show a whole grid of {shape[0]} x {shape[1]} dots, got {grid.shape[1]} x {grid.shape[0]}"
             )
-    return _measured(image, grid, noise)
+    return measured(image, grid, noise)
 
 
 def _blots(image: np.ndarray, bright: bool) -> np.ndarray:
@@ -137,11 +136,28 @@ def _grown(places: np.ndarray, tree, first: int) -> dict[tuple[int, int], int]:
     return there
 
 
-def _measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
-    """The likeliest centre of each dot about which there is room."""
+def respond(image: np.ndarray, board: Board, grid: np.ndarray) -> sparse.csr_array:
+    """Derivatives of all coordinates x, y, x, ... of a board's dots by the image's pixels, (2 n, height * width).
+
+    ``grid`` is that from which they were measured; rows of dots that are not are empty.
+    """
+    n, which = len(board.corners), np.flatnonzero(board.measured)
+    if not which.size:
+        return sparse.csr_array((2 * n, image.size))
+    blots = grid.reshape(-1, 5)
+    rows, places, there = dot_rows(image, blots[which], dot_reach(blots[:, 2], _ways(grid))[which])
+    x, y = np.where(there[..., None], places, 0).astype(int).transpose(2, 0, 1)
+    column = np.broadcast_to((y * image.shape[1] + x)[:, None], rows.shape)
+    row = np.broadcast_to((2 * which[:, None] + [0, 1])[..., None], rows.shape)
+    return sparse.csr_array((rows.ravel(), (row.ravel(), column.ravel())), (2 * n, image.size))
+
+
+def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
+    """The likeliest centre of each dot about which there is room; ``grid`` (rows, columns, 5) has x, y, a, b, px, and
+    angle, degrees, of each."""
     blots, way = grid.reshape(-1, 5), _ways(grid)
     state = np.where(np.isfinite(way) & np.isfinite(blots[:, 0]), status.OK, status.NOT_VISIBLE).astype(object)
-    reach = blots[:, 2] + np.minimum(_LOOKED_AT * (way - 2 * blots[:, 2]), _FARTHEST)
+    reach = dot_reach(blots[:, 2], way)
     low, high = (blots[:, :2] + sign * (reach + 1)[:, None] for sign in (-1, 1))
     with np.errstate(invalid="ignore"):
         room = (low >= 0).all(1) & (high <= np.array(image.shape[::-1]) - 1).all(1) & (reach > blots[:, 2] + _LEAST_GAP)

@@ -43,7 +43,7 @@ def offsets(board: Board, square: float, pose: np.ndarray, matrix: np.ndarray, c
     circle = board.radius * np.stack([np.cos(angle), np.sin(angle)], -1)
     around = _projected(square * (board.places[:, None] + circle), pose, matrix, coefficients)
     middle = _projected(square * board.places, pose, matrix, coefficients)
-    return _centroid(around - middle[:, None])
+    return centroid(around - middle[:, None])
 
 
 def _projected(places: np.ndarray, pose: np.ndarray, matrix: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
@@ -51,12 +51,12 @@ def _projected(places: np.ndarray, pose: np.ndarray, matrix: np.ndarray, coeffic
     return cv2.projectPoints(flat[:, None], pose[:3], pose[3:], matrix, coefficients)[0].reshape(places.shape)
 
 
-def _centroid(outline: np.ndarray) -> np.ndarray:
+def centroid(outline: np.ndarray) -> np.ndarray:
     """Of the area within polygons (n, m, 2), (n, 2).
 
     Examples
     --------
-    >>> _centroid(np.array([[[0.0, 0], [2, 0], [2, 1], [0, 1]]]))
+    >>> centroid(np.array([[[0.0, 0], [2, 0], [2, 1], [0, 1]]]))
     array([[1. , 0.5]])
     """
     ahead = np.roll(outline, -1, 1)

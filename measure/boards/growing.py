@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from measure.boards.windows import steps
+from imaging.boards.windows import steps
 
 _ALIKE = 0.7  # of its neighbour: how strongly a corner has to alternate; at the board's rim it is a half
 _FEWEST, _MOST = 3, 200  # lines

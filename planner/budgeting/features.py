@@ -1,4 +1,4 @@
-"""What a picture of another station does to the lines and circles that are found in it by who believes the scene.
+"""What a picture of another station does to lines, circles and boards that are found in it by who believes the scene.
 
 Every point of a feature is recorded elsewhere; the believed camera's model takes it back to ideal coordinates, and the
 least-squares line or circle through all points of the feature follows. It is found as the estimators find it: densely
@@ -59,12 +59,13 @@ class Features:
 
         Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
         circle's centre in its plane and change of its radius (the scene's unit); the zones of forms, with the sign of
-        the farthest point's side (the scene's unit). NaN where a feature is not seen.
+        the farthest point's side (the scene's unit); a board's own parameters. NaN where a feature is not seen.
         """
         on_edges, *on_rims = self._displaced(station)
         parts = [self._lines(on_edges).ravel()]
         parts += [fit @ off for (_, _, fit), off in zip(self._rims, self._outwards(on_rims), strict=True)]
         parts.append(np.array([self._form(on_edges, on_rims, quantity) for quantity in self.known.seen.forms]))
+        parts.append(self._board(station))
         return np.concatenate(parts)
 
     @cached_property
@@ -128,6 +129,17 @@ class Features:
             return np.nan
         size = needed(reference_of(quantity))(off)
         return float(size * np.sign(off[np.abs(off).argmax()]))
+
+    def _board(self, station: Station) -> np.ndarray:
+        """Parameters of a board, of which none are where there is none."""
+        here, there = self.pictures.scene.placement.board, station.scene.placement.board
+        board = None if self.known.placing is None else self.known.placing.board
+        if here is None or there is None or board is None:
+            return np.zeros(0)
+        camera = self.pictures.scene.camera
+        found = undistorted(station.record(station.board_at(there.points)), camera)
+        moved = found - project_ideal(here.points, self.pictures.sensors, camera)
+        return np.einsum("kni,ni->k", board.gain(), moved)
 
     def _beside_edge(self, moved: np.ndarray, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
         """Distances of an edge's points, the scene's unit, and the design of its line."""

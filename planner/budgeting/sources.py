@@ -11,6 +11,7 @@ import numpy as np
 from planner.budgeting.station import Station
 from planner.uncertainty.inputs import Input
 from scenes import Scene, Uncertain
+from scenes.board import PITCH
 from scenes.numbers import number_at, with_number
 from scenes.placement import COMPONENTS
 
@@ -24,7 +25,7 @@ _UNITS = {
     "flange_mm": "mm", "wavelength_nm": "nm", "line_time_us": "us", "shear": "px a row",
     "exposure": "levels", "sigma": "levels", "dark_level": "levels", "dsnu": "levels",
 }  # fmt: skip
-_LENGTHS = ("distance", "look_at", "radius", "aperture_radius", "focus", "offset", "height", "half_side")
+_LENGTHS = ("pitch", "distance", "look_at", "radius", "aperture_radius", "focus", "offset", "height", "half_side")
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ def _numbers(scene: Scene) -> Iterator[Source]:
     for each in scene.uncertain:
         value = number_at(scene, each.key)
         name = each.key.split("[")[0].split(".", 1)[1]
-        kind: Kind = "geometry" if each.key.startswith("camera.") and name in _GEOMETRY else "brightness"
+        geometric = each.key == PITCH or (each.key.startswith("camera.") and name in _GEOMETRY)
+        kind: Kind = "geometry" if geometric else "brightness"
         last = name.rsplit(".", 1)[-1]
         unit = (
             f"{scene.units}/s"
@@ -129,6 +131,10 @@ def _poses(scene: Scene) -> Iterator[Source]:
                     _number_moved("camera.distance"))  # fmt: skip
     for i, (name, told) in enumerate(zip(COMPONENTS, said.of_part, strict=True)):
         unit, scale, attribute = (scene.units, near, "shift") if i < 3 else ("deg", 1.0, "tilt_deg")
+        yield from _one(name, told, unit, "geometry", scale, _tuple_moved(attribute, i % 3))
+    for i, (name, told) in enumerate(zip(COMPONENTS, said.of_board, strict=True)):
+        unit, scale, attribute = (scene.units, near, "board_shift") if i < 3 else ("deg", 1.0, "board_tilt_deg")
+        name = name.replace("part", "board")
         yield from _one(name, told, unit, "geometry", scale, _tuple_moved(attribute, i % 3))
     for i, axis in enumerate("xy"):
         move = _tuple_moved("principal_px", i)

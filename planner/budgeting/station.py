@@ -34,6 +34,8 @@ class Station:
         Of the part along x, y and z, the scene's unit.
     tilt_deg : tuple of float
         Rotation vector of the part about ``pivot``, degrees.
+    board_shift, board_tilt_deg : tuple of float
+        The same of a board relative to the part.
     pivot : tuple of float
     """
 
@@ -46,6 +48,8 @@ class Station:
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tilt_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pivot: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    board_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    board_tilt_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @classmethod
     def nominal(cls, pictures: Pictures) -> Station:
@@ -74,14 +78,21 @@ class Station:
 
     def part_at(self, points: np.ndarray) -> np.ndarray:
         """Where points (..., 3) of the part truly are."""
-        at, vector = points, np.radians(self.tilt_deg)
+        return self._at(points, self.shift, self.tilt_deg)
+
+    def board_at(self, points: np.ndarray) -> np.ndarray:
+        """Where points (..., 3) of a board would be, were the part in its place."""
+        return self._at(points, self.board_shift, self.board_tilt_deg)
+
+    def _at(self, points: np.ndarray, shift: tuple[float, ...], tilt_deg: tuple[float, ...]) -> np.ndarray:
+        at, vector = points, np.radians(tilt_deg)
         angle = float(np.linalg.norm(vector))
         if angle > 0:
             from scipy.spatial.transform import Rotation
 
             pivot = np.array(self.pivot)
             at = Rotation.from_rotvec(vector).apply((at - pivot).reshape(-1, 3)).reshape(at.shape) + pivot
-        return at + np.array(self.shift)
+        return at + np.array(shift)
 
     def ideal(self, points: np.ndarray) -> np.ndarray:
         """Where a pinhole at the true pose sees points (n, 3) of the part, px, shape (n, 2)."""

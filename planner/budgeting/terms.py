@@ -23,6 +23,7 @@ NOISE, PATTERN, MODEL, ROUNDING = "pixel noise", "fixed pattern", "model error",
 BIAS = "bias by "  # and what its correction is not sure of
 TOGETHER = "telecentricity x depth"
 DATUMS = "datums"  # where they lie on the part, beside where its model says
+POINTS = "board points"  # where they are on the board: print, flatness
 TEMPERATURE, EXPANSION = "temperature_K", "expansion_per_K"
 _LOOKED = np.linspace(0.1, 0.9, 5)  # of an edge's length
 
@@ -92,7 +93,8 @@ def unbiased(pictures: Pictures, variances: np.ndarray) -> list[list[Term]]:
     """
     scene, known = pictures.scene, measurands(pictures)
     pattern = _pattern(pictures, known) if scene.uncertainty.fixed_pattern else np.zeros(len(variances))
-    still, found = {DATUMS: _by_datums(pictures, known), PATTERN: pattern}, []
+    by = DATUMS if scene.placement.board is None else POINTS
+    still, found = {by: _by_datums(pictures, known), PATTERN: pattern}, []
     for m, quantity in enumerate(known.quantities):
         unit, noise = scene.unit_of(quantity), Uncertain(sd=float(np.sqrt(variances[m])), type="A")
         rows = [Term(NOISE, 0.0, noise, unit, 1.0, "noise")]
@@ -102,7 +104,8 @@ def unbiased(pictures: Pictures, variances: np.ndarray) -> list[list[Term]]:
 
 
 def _by_datums(pictures: Pictures, known: Measurands) -> np.ndarray:
-    """Standard uncertainties (M,) by what the datums are off on the part; 0 where its place is known otherwise."""
+    """Standard uncertainties (M,) by what the datums are off on the part, or a board's points on it; 0 where the
+    part's place is known otherwise."""
     adjustment = None if known.placing is None else variance_model(DEFAULT_MODEL)(pictures).adjustment
     if adjustment is None:
         return np.zeros(len(known.quantities))

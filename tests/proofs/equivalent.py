@@ -8,7 +8,7 @@ EQUIVALENT: dict[str, str] = {
         "of some nodes alone sums of all are asked for, never by piece",
     "scenes/parts/mesh.py: used = used[np.lexsort(np.round(mesh.vertices[used] / mesh.extents.min(), 7).T[::-1])]":
         "what is rounded away is far below what tells vertices apart, by either size",
-    "measure/boards/windows.py: first = np.unique(flat[:, 1] * width - flat[:, 0], return_index=True)[1]":
+    "imaging/boards/windows.py: first = np.unique(flat[:, 1] * width - flat[:, 0], return_index=True)[1]":
         "another numbering of pixels, as unique",
     "measure/estimators/expansion.py: none = np.zeros((len(told), self.inverse.shape[-1]))": "a square matrix",
     "measure/photo/uneven.py: corners = layout.faces[-1]": "of a photograph's polygon, the only face",

@@ -2,9 +2,10 @@
 
 Three convex parts at random places (shifts to 5 mm, heights to 2 mm, turns and tilts to 3 degrees), each exposed once
 by the image model (`imaging.blurred.whole`), with noise drawn anew. Each is found without a start, its place adjusted
-from its edges, its values measured. Pulls of place and values (error over told standard deviation) must have a spread
-of 1 within 5 % and a mean within 0.1. Two controls must fail: values with the variance of a known place, and variances
-1.3 times too large.
+from its edges, its values measured. With ``--board`` a board behind it tells the place, shifts to 3 mm; where it lies
+beside the part, how large it is and where its points are is as uncertain as the scene says, and drawn anew each time.
+Pulls of place and values (error over told standard deviation) must have a spread of 1 within 5 % and a mean within 0.1.
+Two controls must fail: values with the variance of a known place, and variances 1.3 times too large.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from measure.quantities import find, values
 from scenes import Picture, Scene
 from scenes.status import is_trusted
 from tests import placements as placed_parts
+from tests import printed
 
 FOUND, SPREAD, MEAN = 0.99, 0.05, 0.1
 
@@ -52,8 +54,8 @@ class Pulls:
 
 def one(picture: Picture, rng: np.random.Generator, found: Pulls) -> None:
     """One place at random."""
-    there = placed_parts.drawn(rng)
-    (image,) = render.expose(placed_parts.seen(picture, there), picture.scene.noise, rng, 1)
+    there = printed.place(picture, rng)
+    (image,) = render.expose(printed.seen(printed.drawn(picture, rng), there), picture.scene.noise, rng, 1)
     found.tried += 1
     where = measure.locate(image, picture)
     if where.status != "ok":
@@ -122,6 +124,7 @@ def placements(
     places: Annotated[int, typer.Option(help="Places of each part.")] = 334,
     seed: Annotated[int, typer.Option()] = 1,
     only: Annotated[str, typer.Option(help="Parts whose names begin so.")] = "",
+    board: Annotated[str, typer.Option(help="chessboard or dots: they tell the place.")] = "",
 ) -> None:
     """Three parts at 1000 random places: found, and place and values as well known as told; an hour."""
     every, good = [], True
@@ -129,7 +132,8 @@ def placements(
         for k, name in enumerate(placed_parts.CORNERS):
             if not name.startswith(only):
                 continue
-            scene, found = placed_parts.scene(Path(folder), name), Pulls()
+            made = printed.scene(Path(folder), name, board) if board else placed_parts.scene(Path(folder), name)
+            scene, found = made, Pulls()
             picture, rng = Picture.of(scene, placed_parts.SENSOR, placed_parts.LIGHT), np.random.default_rng((seed, k))
             for _ in range(places):
                 one(picture, rng, found)

@@ -8,14 +8,14 @@ import pytest
 from scipy import sparse
 from scipy.stats import chi2
 
+from imaging.boards.fitting import Crossings
+from imaging.boards.windows import steps, windows
 from measure.boards import chessboard
 from measure.boards.adjustment import _inverse, _object
 from measure.boards.camera import CameraCalibration, _calibration, _check
 from measure.boards.chessboard import _board, _clipped, _least_noise, _nothing, _start, check_shape
-from measure.boards.fitting import Crossings
 from measure.boards.growing import _alternates, _alternation, _next, grown, trimmed
 from measure.boards.parameters import read_model
-from measure.boards.windows import steps, windows
 from measure.photo import board_noise
 from measure.photo.binned import binned
 from measure.photo.board_noise import board_covariance

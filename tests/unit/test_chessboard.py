@@ -8,11 +8,11 @@ import pytest
 from scipy import stats
 
 import measure
+from imaging.boards.fitting import fit_crossings
+from imaging.boards.saddle import response
+from imaging.boards.windows import windows
 from measure.boards.bend import bends
 from measure.boards.chessboard import measured
-from measure.boards.fitting import fit_crossings
-from measure.boards.saddle import response
-from measure.boards.windows import windows
 from scenes import InvalidInput
 from tests.boards import SMALL, in_order, poses
 from tests.oracle import polygon_image

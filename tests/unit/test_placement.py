@@ -1,5 +1,7 @@
 """The part's place as an unknown: what it does to features, the adjustment, statuses, budget; where it is found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -202,7 +204,7 @@ def test_the_adjustments_information_is_that_of_exact_images(folder):
     np.testing.assert_allclose(told, exact, rtol=0.03)
     fewer = Placing.of(scene, found.known.seen)
     less = np.where(np.arange(len(fewer.datums)) < 4, fewer.datums, False)
-    lost = Placing(fewer.names, fewer.u, fewer.expected, fewer.slopes, fewer.features, less, fewer.scatter)
+    lost = replace(fewer, datums=less)
     assert (np.diag(lost.adjusted(found.of_datums).posterior[0]) > 1.5 * exact).all()  # negative control: two datums
 
 
@@ -286,5 +288,5 @@ def test_a_part_that_may_lie_the_other_way_round_is_refused_by_name(found):
     assert not np.isfinite(where.placement).any()
     nothing = measure.locate(np.full_like(image, 16.0), picture)
     assert (nothing.status, nothing.explained) == ("not_visible", 0.0)
-    with pytest.raises(InvalidInput, match=r"placement\.from must be datums to find the part, got 'known'"):
+    with pytest.raises(InvalidInput, match=r"placement\.from must be datums or board to find the part, got 'known'"):
         measure.locate(image, _with(picture, placement={"from": "known", "datums": [], "datum_sd": None}))

@@ -17,6 +17,9 @@ from scipy import stats
 import measure
 import planner
 import scenes
+from imaging.boards.fitting import fit_crossings
+from imaging.boards.saddle import response
+from imaging.boards.windows import Windows
 from imaging.contours import contour, limb
 from imaging.features.circles import RimImage, calibrated_circle
 from imaging.features.projected_edges import projected_edges
@@ -25,9 +28,6 @@ from imaging.light.appearance import edge_contrast, side_signals
 from imaging.light.emitters import emitters
 from imaging.light.exchange import _arriving, exchanged
 from imaging.pictures import Pictures
-from measure.boards.fitting import fit_crossings
-from measure.boards.saddle import response
-from measure.boards.windows import Windows
 from measure.features.layout import BACKGROUND, polygon_layout
 from measure.features.optics import Optics
 from measure.fitting.likelihood import Problem

@@ -32,7 +32,8 @@ def text(found: measure.Located) -> str:
         ", ".join(f"{value:.4g} +- {one:.1g}" for value, one in zip(values, sds, strict=True))
         for values, sds in zip(np.split(found.placement, 2), np.split(sigma, 2), strict=True)
     )
+    what = "its edges are seen there" if found.picture.scene.placement.board is None else "the board's points are found"
     return (
         f"The part lies beside where the scene says by ({shift}) {unit}, turned by ({turn}) degrees (1 sigma);"
-        f" {100 * found.explained:.0f} % of its edges are seen there"
+        f" {100 * found.explained:.0f} % of {what}"
     )

@@ -25,6 +25,7 @@ TEACHES = {
     "anodised": "Each face may have a material of its own: milled faces beside anodised ones.",
     "backlight_plate": "Edges as silhouettes against a telecentric backlight: what a hole's far rim does to its width.",
     "ball": "What has no edge is measured by its limb: a ball's diameter and centre.",
+    "board_block": "A chessboard beside the part tells where both lie, and no camera has to be where the scene says.",
     "bracket": "A part that hides and shadows itself: a riser's light biases the edge at its foot.",
     "bracket_mm": "Seven numbers of a drawing, a part of 60 mm, 5 megapixels, camera and lens as on data sheets.",
     "bracket_station": "The same at a station of which all is stated that is not exactly known: what may be signed.",

@@ -13,7 +13,7 @@ from matplotlib.collections import PolyCollection
 from imaging.geometry.projection import facing, project
 from imaging.geometry.visibility import visible_spans
 from planner import Pictures
-from scenes import Circle, Edge, Pose, Scene
+from scenes import Board, Circle, Edge, Pose, Scene
 from validation.report.canvas import WIDTH, plt, save
 
 _PIECES = 9  # of an edge that a lens may bend
@@ -27,10 +27,17 @@ _LABEL = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.
 def draw(scene: Scene, sensor: Pose, path: Path) -> Path:
     """Draw what the sensor sees of the object, its parts in colours by kind, with their names; a PNG file."""
     view = _View(scene, sensor)
-    low, high = (f(view.image(scene.solid.vertices), axis=0) for f in (np.nanmin, np.nanmax))
+    shown = (
+        scene.solid.vertices
+        if (board := scene.placement.board) is None
+        else np.concatenate([scene.solid.vertices, board.outline])
+    )
+    low, high = (f(view.image(shown), axis=0) for f in (np.nanmin, np.nanmax))
     across, down = np.maximum(high - low, 1e-9)
     height = np.clip(0.85 * WIDTH * down / across, *_HEIGHTS)
     figure, axis = plt.subplots(figsize=(WIDTH, height + _AROUND), layout="constrained")
+    if board is not None:
+        _board(axis, view, board)
     _faces(axis, view)
     for edge in scene.solid.sharp:
         _edge(axis, view, edge)
@@ -129,6 +136,15 @@ def _faces(axis, view: _View) -> None:
     order = order[shown[solid.triangle_faces[order]]]
     greys = [str(grey) for grey in 0.55 + 0.37 * cosines[order]]
     axis.add_collection(PolyCollection(corners[order], facecolors=greys, edgecolors=greys, linewidths=0.5))
+
+
+def _board(axis, view: _View, board: Board) -> None:
+    """A board beside the part, where it is turned to the sensor."""
+    if view.viewpoint.towards(board.points[:1])[0] @ board.axes[2] > 0:
+        dark = board.dark_polygons
+        corners = view.image(board.at(dark.reshape(-1, 2))).reshape(dark.shape)
+        axis.add_collection(PolyCollection([view.image(board.outline)], facecolors="0.9", edgecolors="0.5"))
+        axis.add_collection(PolyCollection(corners, facecolors="0.3"))
 
 
 def _edge(axis, view: _View, edge: Edge) -> None:

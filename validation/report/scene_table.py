@@ -38,6 +38,7 @@ def facts(scene: Scene) -> dict[str, Any]:
             light.model_dump(mode="json", exclude_defaults=True) | picked(light, "kind", "mount")
             for light in scene.lights
         ],
+        **({} if (board := scene.placement.board) is None else {"board": board.model_dump(mode="json")}),
     })  # fmt: skip
 
 

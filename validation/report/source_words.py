@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE, TOGETHER
+from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, POINTS, ROUNDING, TEMPERATURE, TOGETHER
+from scenes.board import PITCH
 
 ALL = "all sources"  # of a correction's uncertainty together, where a run knows no more than their sum
 _WORDS = {
@@ -28,11 +29,13 @@ _WORDS = {
     "p1": "lens distortion, p1", "p2": "lens distortion, p2",
     "camera.pixel_pitch_um": "pixel pitch",
     "camera.blur_px": "blur",
+    PITCH: "pitch of the board", POINTS: "places of points on the board",
     "camera.exposure": "exposure",
 }  # fmt: skip
 _OF_PARTS = {
     "sensor_deg": "direction of the camera", "light_deg": "direction of the lamp", "part_shift": "place of the part",
-    "part_tilt_deg": "tilt of the part", "principal_point_px": "principal point",
+    "part_tilt_deg": "tilt of the part", "board_shift": "place of the board", "board_tilt_deg": "tilt of the board",
+    "principal_point_px": "principal point",
 }  # fmt: skip
 
 

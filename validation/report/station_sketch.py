@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from imaging.geometry.projection import sensor_position
 from imaging.pictures import Pictures
-from scenes import Picture
+from scenes import Picture, Scene
 from validation.report.canvas import TEXT, inline, plt
 
 _SIZE = 2.3, 2.2  # inches of a view
@@ -65,6 +65,9 @@ def draw(picture: Picture) -> Markup:
 def _panel(axis, flat: np.ndarray, picture: Picture, eye: np.ndarray, lamps: list[np.ndarray]) -> None:
     scene, middle = picture.scene, np.array(picture.scene.camera.look_at) @ flat
     _part(axis, scene.solid.vertices @ flat)
+    board = scene.placement.board
+    if board is not None:
+        axis.fill(*(board.outline @ flat).T, facecolor="#e8e8e8", edgecolor="#333333", lw=0.8)
     camera = eye @ flat
     _ray(axis, middle, camera, _CAMERA)
     for lamp in lamps:
@@ -74,7 +77,13 @@ def _panel(axis, flat: np.ndarray, picture: Picture, eye: np.ndarray, lamps: lis
         axis.plot(*points.T, "*" if single else ".", color=_LAMP, ms=12 if single else 3, ls="")
     axis.plot(*camera, "s", color=_CAMERA, ms=9)
     places = [("camera", camera, _CAMERA), *(("lamp", lamp.mean(0) @ flat, _LAMP) for lamp in lamps[:1])]
-    _labels(axis, places, np.array([scene.solid.vertices @ flat]).reshape(-1, 2), middle)
+    _labels(axis, places, _shown(scene) @ flat, middle)
+
+
+def _shown(scene: Scene) -> np.ndarray:
+    """Corners (n, 3) of part and board."""
+    board = scene.placement.board
+    return scene.solid.vertices if board is None else np.concatenate([scene.solid.vertices, board.outline])
 
 
 def _part(axis, points: np.ndarray) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 
 import measure
 import planner
-from measure.boards import bend, saddle
+from imaging.boards import saddle
+from measure.boards import bend
 from measure.estimators import crossing, crossings, profile, windows
 from measure.features import conic
 from measure.find import four_sides, rounds

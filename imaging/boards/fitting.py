@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure.boards.saddle import SHAPE, response
-from measure.boards.windows import Windows
+from imaging.boards.saddle import SHAPE, response
+from imaging.boards.windows import Windows
 
 _LEVELS = 12  # linear in place in each of four quadrants
 PARAMETERS = SHAPE + _LEVELS
@@ -24,7 +24,7 @@ class Crossings:
     Attributes
     ----------
     shape : ndarray, shape (n, 5)
-        As of `measure.boards.saddle.response`.
+        As of `imaging.boards.saddle.response`.
     unit_covariance : ndarray, shape (n, 2, 2)
         Of x and y for noise of variance 1 in each pixel, px^2.
     square : ndarray, shape (n,)

@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from measure.boards.fitting import solved
+from imaging.boards.fitting import solved
 
-_STEPS, _SETTLED = 20, 3e-3  # of Gauss and Newton; px of a centre's last step, whose error is about the square
+_STEPS, _SETTLED = 20, 3e-4  # of Gauss and Newton; px of a centre's last step
 _LARGEST = 0.5  # px, or times the size, of one step
 _BLURS = 0.25, 8.0  # px, of an edge's profile
 _TOGETHER = 2e6  # pixels of windows at a time
+_BESIDE = 0.4  # of what is between a dot and the next: is looked at
+_FARTHEST = 6.0  # px beside a dot that are looked at
 _PARAMETERS = 10  # centre, shape, blur, level and its slopes, contrast
 
 
@@ -28,6 +30,42 @@ class Dots(NamedTuple):
     radius: np.ndarray
     blur: np.ndarray
     converged: np.ndarray
+
+
+def dot_reach(radius: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """How far about a dot's middle is looked at, px: by its larger radius, and the way to the next one."""
+    return radius + np.minimum(_BESIDE * (way - 2 * radius), _FARTHEST)
+
+
+def dot_expected(ellipse: np.ndarray, reach: float, blur: float) -> tuple[np.ndarray, np.ndarray]:
+    """What is expected of a dot's centre as `fit_dots` finds it.
+
+    Parameters
+    ----------
+    ellipse : ndarray, shape (5,)
+        x, y, a, b, px, and angle, degrees.
+    reach, blur : float
+        How far it is looked at, and standard deviation of its edge's profile, px.
+
+    Returns
+    -------
+    covariance : ndarray, shape (2, 2)
+        At unit noise and contrast, px^2; infinite where too few pixels see it.
+    leant : ndarray, shape (2, 2)
+        Derivative of the centre by the light's slope over the light, px^2: a dot's levels are fitted as if its contrast
+        were even.
+    """
+    half = int(np.ceil(reach)) + 2
+    here = np.array([[*(ellipse[:2] - np.rint(ellipse[:2]) + half), *ellipse[2:]]])
+    place, levels, there = _windows(np.zeros((2 * half + 1,) * 2), here, np.array([reach]))
+    values = np.concatenate([here[:, :2], _shape(here), np.full((1, 1), np.clip(blur, *_BLURS))], 1)
+    if there.sum() <= _PARAMETERS:
+        return np.full((2, 2), np.inf), np.zeros((2, 2))
+    expected = _linear(place, levels, there, values)[0][..., -1]
+    matrix, residual, _ = _linear(place, expected, there, values)
+    inverse = solved(matrix, residual)[1][0, :2]
+    more = expected[0, :, None] * (place[0] - here[0, :2])
+    return inverse[:, :2], inverse @ matrix[0].T @ more
 
 
 def fit_dots(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> Dots:
@@ -50,7 +88,29 @@ def fit_dots(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> Dots:
     return Dots(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
+def dot_rows(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives of x and y of dots, fitted as by `fit_dots`, by the pixels of their windows, (n, 2, P), places of
+    these (n, P, 2), and which of them count (n, P)."""
+    place, levels, there, values, _ = _fitted(image, start, reach)
+    matrix, residual, _ = _linear(place, levels, there, values)
+    return np.einsum("nij,npj->nip", solved(matrix, residual)[1][:, :2], matrix), place, there
+
+
 def _fit(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> Dots:
+    place, levels, there, values, rest = _fitted(image, start, reach)
+    matrix, residual, best = _linear(place, levels, there, values)
+    inverse = solved(matrix, residual)[1]
+    determinant = values[:, 2] * values[:, 4] - values[:, 3] ** 2
+    good = rest & (determinant > 0) & np.isfinite(residual).all(1) & (values[:, 5] < _BLURS[1])
+    radius = np.where(determinant > 0, np.abs(determinant), 1.0) ** -0.25
+    return Dots(
+        values[:, :2], inverse[:, :2, :2], (residual**2).sum(1), there.sum(1) - _PARAMETERS, np.abs(best[:, 3]),
+        radius, values[:, 5], good,
+    )  # fmt: skip
+
+
+def _fitted(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Windows, the values (n, 6) that fit them best, and whether these have come to rest (n,)."""
     place, levels, there = _windows(image, start, reach)
     values = np.concatenate([start[:, :2], _shape(start), np.ones((len(start), 1))], 1)
     damping, before = np.ones((len(start), 1)), np.zeros((len(start), 2))
@@ -67,16 +127,7 @@ def _fit(image: np.ndarray, start: np.ndarray, reach: np.ndarray) -> Dots:
         live = live[~(np.abs(step[:, :2]).max(1) < _SETTLED)]
         if not live.size:
             break
-    rest = ~np.isin(np.arange(len(start)), live)
-    matrix, residual, best = _linear(place, levels, there, values)
-    inverse = solved(matrix, residual)[1]
-    determinant = values[:, 2] * values[:, 4] - values[:, 3] ** 2
-    good = rest & (determinant > 0) & np.isfinite(residual).all(1) & (values[:, 5] < _BLURS[1])
-    radius = np.where(determinant > 0, np.abs(determinant), 1.0) ** -0.25
-    return Dots(
-        values[:, :2], inverse[:, :2, :2], (residual**2).sum(1), there.sum(1) - _PARAMETERS, np.abs(best[:, 3]),
-        radius, values[:, 5], good,
-    )  # fmt: skip
+    return place, levels, there, values, ~np.isin(np.arange(len(start)), live)
 
 
 def _scale(size: np.ndarray) -> np.ndarray:

@@ -1,0 +1,250 @@
+"""What the points of a board beside the part tell of the place of both.
+
+Points are found off by y = J p + L b + s + e: J their derivative by the placement p (of part and board together), L b
+what is not known of the board's place relative to the part and of its pitch, s what print and flatness leave open of
+each point, e noise. All that they tell of p is in k numbers (k the components that are not exact): the place that fits
+the points best, in units in which b, s and e together have the covariance 1. These count as the parameters of one more
+feature beside lines and circles (`imaging.features.seen`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from imaging import sensor
+from imaging.boards.dot_fitting import dot_expected, dot_reach
+from imaging.boards.fitting import crossing_rows
+from imaging.boards.saddle import response
+from imaging.boards.windows import steps as ways
+from imaging.boards.windows import windows
+from imaging.features.placing import steps
+from imaging.features.seen import Seen
+from imaging.geometry.blur import blur_at
+from imaging.geometry.lens import image_centre, lens_jacobian, recorded
+from imaging.geometry.projection import depth, from_axis
+from imaging.geometry.rays import first_face
+from imaging.light.appearance import signal
+from imaging.pictures import Pictures
+from scenes import Board, Material, Scene
+from scenes.board import PITCH
+from scenes.placement import of_board, prior
+
+_MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
+CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
+_UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
+_EXACT = 1e-16  # px^2: of points without noise and print
+_UNITS = np.repeat([1.0, np.pi / 180], 3)  # of a placement's components: the scene's unit, and degrees
+
+
+@dataclass(frozen=True, eq=False)
+class SeenBoard:
+    """A board in pictures of leading shape (...): n points, k components of the placement in units of their u before.
+
+    Attributes
+    ----------
+    slopes : ndarray, shape (..., n, 2, k)
+        J: ideal px.
+    noise : ndarray, shape (..., n, 2, 2)
+        Covariance of each point by pixel noise, ideal px^2; infinite diagonal where it cannot be found.
+    printed : ndarray, shape (..., n, 2, 2)
+        The same by print and flatness.
+    beside : ndarray, shape (..., n, 2, m)
+        L in standard uncertainties: place relative to the part, pitch.
+    """
+
+    slopes: np.ndarray
+    noise: np.ndarray
+    printed: np.ndarray
+    beside: np.ndarray
+
+    def gain(self, noise: np.ndarray | None = None) -> np.ndarray:
+        """Derivatives (..., k, n, 2) of the board's parameters by its points, found with a noise (..., n, 2, 2) of
+        their own."""
+        fit, _ = self._fit(self.noise if noise is None else noise)
+        return np.einsum("...kl,...lni->...kni", self.root, fit)
+
+    def spread(self, covariance: np.ndarray, gain: np.ndarray | None = None) -> np.ndarray:
+        """Covariance (..., k, k) of the parameters by independent errors of the points (..., n, 2, 2)."""
+        gain = self.gain() if gain is None else gain
+        known = np.where(np.isfinite(covariance), covariance, 0.0)
+        return np.einsum("...kni,...nij,...lnj->...kl", gain, known, gain)
+
+    @property
+    def of_beside(self) -> np.ndarray:
+        """The same by place relative to the part and pitch."""
+        moved = np.einsum("...kni,...nim->...km", self.gain(), self.beside)
+        return moved @ np.swapaxes(moved, -1, -2)
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """Derivatives (..., k, k) of the parameters by the placement: a square root of what they tell of it."""
+        fit, (sizes, directions) = self._fit(self.noise)
+        told = sizes > _UNTOLD
+        whole = np.where(told, np.sqrt(np.maximum(sizes, 0.0)), 0.0)[..., None] * np.swapaxes(directions, -1, -2)
+        moved = whole @ np.einsum("...kni,...nim->...km", fit, self.beside)
+        total, turn = np.linalg.eigh(np.eye(whole.shape[-1]) + moved @ np.swapaxes(moved, -1, -2))
+        return (turn / np.sqrt(total)[..., None, :]) @ np.swapaxes(turn, -1, -2) @ whole
+
+    def _fit(self, noise: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Weighted least squares, (..., k, n, 2), and sizes and directions of what the points tell."""
+        whole = noise + self.printed + _EXACT * np.eye(2)
+        there = np.isfinite(np.einsum("...ii->...", whole))[..., None, None]
+        weight = np.where(there, np.linalg.inv(np.where(there, whole, np.eye(2))), 0.0)
+        back = np.einsum("...nik,...nij->...knj", self.slopes, weight)
+        sizes, directions = np.linalg.eigh(np.einsum("...knj,...njl->...kl", back, self.slopes))
+        inverse = np.where(sizes > _UNTOLD, 1 / np.where(sizes > _UNTOLD, sizes, 1.0), 0.0)[..., None, :]
+        covariance = (directions * inverse) @ np.swapaxes(directions, -1, -2)
+        return np.einsum("...kl,...lnj->...knj", covariance, back), (sizes, directions)
+
+
+def seen_board(pictures: Pictures, seen: Seen) -> SeenBoard | None:
+    """That of a scene as it is expected; None where there is no board."""
+    board, said = pictures.scene.placement.board, pictures.scene.uncertainty
+    if board is None:
+        return None
+    by_place = seen.slopes(board.points)  # (..., n, 2, 3)
+    moved = by_place @ (steps(board.points, np.array(seen.camera.look_at)) * _UNITS)
+    u = prior(said)
+    away = board.points - np.array(board.corner)
+    by_pitch = np.einsum("...nij,nj->...ni", by_place, away / board.pitch)[..., None] * _pitch_u(pictures.scene)
+    beside = np.concatenate([moved * of_board(said), by_pitch], -1)
+    return SeenBoard(
+        slopes=moved[..., u > 0] * u[u > 0],
+        noise=_noise(pictures, board),
+        printed=board.point_sd**2 * by_place @ np.swapaxes(by_place, -1, -2),
+        beside=beside,
+    )
+
+
+def _pitch_u(scene: Scene) -> float:
+    """Standard uncertainty of the board's pitch, the scene's unit."""
+    return next((each.u for each in scene.uncertain if each.key == PITCH), 0.0)
+
+
+def _noise(pictures: Pictures, board: Board) -> np.ndarray:
+    """Covariance (..., n, 2, 2) of points as they are found, ideal px^2."""
+    camera, centre = pictures.scene.camera, image_centre(pictures.scene.camera)
+    ideal = centre + from_axis(board.points, pictures.sensors, camera)
+    places = recorded(ideal, camera)
+    back = np.linalg.inv(lens_jacobian(ideal, camera))
+    share, noise = _contrast(pictures, board)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = noise / share**2
+    unit = back @ _unit(pictures, board, places)[..., None, :, :] @ np.swapaxes(back, -1, -2)
+    found = size[..., None, None] * unit
+    good = np.isfinite(found).all((-1, -2)) & (share > 0) & (_inside(places, camera) & _apart(pictures, board))
+    return np.where(good[..., None, None], found, np.where(np.eye(2, dtype=bool), np.inf, 0.0))
+
+
+def levels(pictures: Pictures, board: Board, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Signals of bright and of dark at points (n, 3) of a board, grey levels above darkness, (..., n) each.
+
+    0 where a light or the sensor does not reach them, or the part shades them; as of a white surface before the light
+    where it is not known where that stands.
+    """
+    shades = board.bright, board.dark
+    if not pictures.lights:
+        lead = (*pictures.sensors.shape[:-1], len(points))
+        bright, dark = (np.full(lead, pictures.scene.camera.exposure * shade) for shade in shades)
+        return bright, dark
+    lit = tuple(_lit(pictures, np.asarray(emitter.at), points) for emitter in pictures.emitters)
+    normal = board.axes[2]
+    bright, dark = (
+        signal(pictures, points, normal, 1, lit, material=Material(diffuse_reflectance=shade)) for shade in shades
+    )
+    return bright, dark
+
+
+def _lit(pictures: Pictures, at: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether light from places (..., 3) passes the part on its way to points (n, 3), bool (..., n)."""
+    start = np.broadcast_to(at[..., None, :], (*at.shape[:-1], *points.shape))
+    _, t = first_face(pictures.scene.bodies, start, points - start, ())
+    return t >= 1
+
+
+def _contrast(pictures: Pictures, board: Board) -> tuple[np.ndarray, np.ndarray]:
+    """Recorded contrast of bright and dark, and the mean variance of the noise of both, (..., n) each."""
+    noise = pictures.scene.noise
+    both = [sensor.recorded(noise, noise.dark_level + each) for each in levels(pictures, board, board.points)]
+    return both[0].level - both[1].level, (both[0].noise_variance + both[1].noise_variance) / 2
+
+
+def _inside(places: np.ndarray, camera) -> np.ndarray:
+    """Which recorded places (..., 2) are far enough from the image's ends."""
+    last = np.array([camera.width, camera.height]) - 1
+    with np.errstate(invalid="ignore"):
+        return ((places >= _MARGIN) & (places <= last - _MARGIN)).all(-1)
+
+
+def _apart(pictures: Pictures, board: Board) -> np.ndarray:
+    """Whether a side of the board has all of the part behind it in the picture, bool (..., 1)."""
+    camera = pictures.scene.camera
+    outline = from_axis(board.outline, pictures.sensors, camera)
+    part = from_axis(pictures.scene.solid.vertices, pictures.sensors, camera)
+    side = np.roll(outline, -1, -2) - outline
+    normal = np.stack([side[..., 1], -side[..., 0]], -1)
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    away = np.einsum("...si,...spi->...sp", normal, part[..., None, :, :] - outline[..., :, None, :])
+    middle = np.einsum("...si,...si->...s", normal, outline.mean(-2, keepdims=True) - outline)
+    beyond = -np.sign(middle)[..., None] * away
+    return (beyond > CLEAR).all(-1).any(-1)[..., None]
+
+
+def _unit(pictures: Pictures, board: Board, places: np.ndarray) -> np.ndarray:
+    """Covariance (..., 2, 2) of a point in the board's middle for unit noise and unit contrast, recorded px^2.
+
+    All of a board's points are taken to be seen as that one: what differs from end to end is alike on both sides of
+    it. Infinite where there is no room.
+    """
+    columns, rows = board.shape
+    grids = places.reshape(*places.shape[:-2], rows, columns, 2)
+    y, x = rows // 2, columns // 2
+    grids = grids[..., y - 1 : y + 2, x - 1 : x + 2, :]
+    middle = board.points.reshape(rows, columns, 3)[y, x]
+    camera = pictures.scene.camera
+    away = depth(middle[None], pictures.sensors, camera)[..., 0]
+    blur = np.broadcast_to(blur_at(camera, away, grids[..., 1, 1, :]), grids.shape[:-3])
+    found = np.empty((*grids.shape[:-3], 2, 2))
+    for index in np.ndindex(*grids.shape[:-3]):
+        args = grids[index], float(blur[index])
+        found[index] = crossing(*args) if board.kind == "chessboard" else dot(*args, board.radius / board.pitch)
+    return found
+
+
+def crossing(grid: np.ndarray, blur: float) -> np.ndarray:
+    """Covariance (2, 2) of the middle one of 3 x 3 corners (3, 3, 2), px, as it is fitted, px^2.
+
+    For noise of variance 1 in each pixel and a contrast of 1 of bright and dark squares.
+    """
+    if not np.isfinite(grid).all():
+        return np.full((2, 2), np.inf)
+    around = int(_MARGIN) + 2
+    here = grid - np.rint(grid[1, 1]) + around
+    window = windows(np.zeros((2 * around + 1, 2 * around + 1)), here).some(np.array([4]))
+    if not window.room[0]:
+        return np.full((2, 2), np.inf)
+    toward = ways(here)[1, 1]
+    shape = np.array([[*here[1, 1], *np.arctan2(toward[:, 1], toward[:, 0]), np.log(blur)]])
+    signs = response(window.places, shape, np.zeros((1, 2))).signs[..., 2]
+    window.levels[:] = np.where(window.there, signs / 2, 0.0)
+    rows = crossing_rows(window, shape, np.zeros((1, 2)))[0]
+    return rows @ rows.T
+
+
+def dot(grid: np.ndarray, blur: float, share: float) -> np.ndarray:
+    """The same of dots whose radius is a share of the way from one to the next."""
+    if not np.isfinite(grid).all():
+        return np.full((2, 2), np.inf)
+    return leaning(grid, blur, share)[0]
+
+
+def leaning(grid: np.ndarray, blur: float, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """The same, and the derivative (2, 2) of its centre by the slope of the light over the light, px^2."""
+    toward = ways(grid)[1, 1].T
+    axes, size, _ = np.linalg.svd(share * toward)
+    ellipse = np.array([*grid[1, 1], *size, np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))])
+    reach = float(dot_reach(size[0], np.sqrt(abs(np.linalg.det(toward)))))
+    return dot_expected(ellipse, reach, float(np.hypot(blur, 12**-0.5)))

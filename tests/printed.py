@@ -1,0 +1,79 @@
+"""A board that is not quite as its scene says: displaced beside the part, of another pitch, points off their places."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from imaging.placed import placed
+from scenes import Board, Picture, Scene
+from scenes.placement import of_board
+from tests import placements as parts
+
+CAMERA = {"width": 352, "height": 400, "look_at": [0, 16, 6]}
+"""Of `tests.placements`, with room for a board behind the part."""
+
+_WHOLE = np.array([0.6, 0.6, 1, 1, 1, 1])  # of `tests.placements.MOST`
+
+
+class Printed(Board):
+    """A board as it truly is."""
+
+    shift: tuple[float, ...] = (0.0,) * 3
+    turn_deg: tuple[float, ...] = (0.0,) * 3
+    pivot: tuple[float, ...] = (0.0,) * 3
+    off: tuple[tuple[float, ...], ...] = ()
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """Points of places; those of a chessboard's inner corners, or of a dot, with their own errors."""
+        columns, rows = self.shape
+        points, near = super().at(places), np.rint(np.asarray(places, float)).astype(int)
+        inner = ((near >= 0) & (near < [columns, rows])).all(-1)
+        close = np.abs(places - near).max(-1) < (1e-9 if self.kind == "chessboard" else 0.45)
+        number = np.where(inner & close, near[..., 1] * columns + near[..., 0], len(self.off))
+        points = points + np.concatenate([np.array(self.off).reshape(-1, 3), np.zeros((1, 3))])[number]
+        turn, pivot = Rotation.from_rotvec(self.turn_deg, degrees=True), np.array(self.pivot)
+        flat = turn.apply((points - pivot).reshape(-1, 3)).reshape(points.shape)
+        return flat + pivot + np.array(self.shift)
+
+
+def scene(folder: Any, name: str, kind: str = "chessboard", **changes: Any) -> Scene:
+    """One of the three parts with a board behind it: known to `tests.placements.MOST` before."""
+    board = {"kind": kind, "shape": [9, 5], "pitch": {"value": 4.0, "sd": 2e-4}, "corner": [-16.0, 42.0, 0.0],
+             "point_sd": 0.002}  # fmt: skip
+    made = parts.scene(folder, name, camera=CAMERA).with_(
+        placement={"from": "board", "board": board, "datums": [], "datum_sd": None},
+        uncertainty={"board_shift": 0.003, "board_tilt_deg": 0.005},
+    )
+    return made.with_(**changes) if changes else made
+
+
+def place(picture: Picture, rng: np.random.Generator) -> np.ndarray:
+    """A place of the part at random, (6,); with a board such that all of it is in the picture."""
+    return parts.drawn(rng, parts.MOST * (1.0 if picture.scene.placement.board is None else _WHOLE))
+
+
+def drawn(picture: Picture, rng: np.random.Generator) -> Picture:
+    """The picture with a board as it may truly be; the same where there is none."""
+    scene, board = picture.scene, picture.scene.placement.board
+    if board is None:
+        return picture
+    shift, turn = np.split(of_board(scene.uncertainty) * rng.standard_normal(6), 2)
+    pitch = next(each.u for each in scene.uncertain if each.key.endswith("pitch"))
+    told = board.model_dump() | {
+        "pitch": board.pitch + pitch * rng.standard_normal(), "shift": shift, "turn_deg": turn,
+        "pivot": scene.camera.look_at, "off": board.point_sd * rng.standard_normal((board.count, 3)),
+    }  # fmt: skip
+    true = Printed.model_validate({key: _plain(value) for key, value in told.items()})
+    return picture.with_scene(scene.tried(placement=scene.placement.tried(board=true)))
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def seen(picture: Picture, placement: np.ndarray) -> np.ndarray:
+    """Noise-free image of part and board at a place, grey levels."""
+    return parts.image(placed(picture, placement))
