@@ -14,7 +14,7 @@ import numpy as np
 
 from validation.recipe.runtime import Recipe
 
-_TIMES = 200
+_TIMES = 1000
 
 
 def _milliseconds(function: Callable[[], object], clock: Callable[[], float]) -> tuple[float, float]:
