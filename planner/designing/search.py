@@ -32,6 +32,7 @@ BUDGET, PLACES = "budget", "places in the image"
 MOST_RATED = 20_000  # pairs that are rated at most, before the search gives up
 _BESIDE = 24  # pairs that are rated for the front beyond the cheapest that does
 _LOOKS, _SIDE_BY_SIDE = 24, 2  # close looks for it at most, and at a time
+_CONTRADICTED = 3  # lights of a pair that close looks contradict, before it is given up
 _SURE = 0.5  # of a noise that another camera's picture tells
 _OF_RATING = ("visibility", "light in the way", "exposure time", "depth of field", "light", "rolling shutter")
 
@@ -92,6 +93,7 @@ class _Search:
         self.ahead = Ahead(problem, self.sensors, self.lenses, self.lights, mapped)
         self.offers: list[Offer] = []
         self.hard: dict[tuple, float] = {}  # of a light's shape: least factor of noise over the bound of its pair
+        self.contradicted: Counter = Counter()  # by pair: how many lights close looks have contradicted
         self.counts: Counter = Counter()
         self.out: Counter = Counter()
 
@@ -191,10 +193,12 @@ class _Search:
     def _closest(self, passing: list[Offer], queue: list[At]) -> Offer | None:
         """The first, by preference, that meets all when it is looked at closely; the others' next lights may do."""
         for offer in sorted(passing, key=lambda each: each.preference):
-            close = self._look(offer)
+            close, pair = self._look(offer), offer.order[0]
             if close is not None and close.ratio <= 1:
                 return close
-            self._put_back(queue, (offer.cost, offer.least, *offer.order))
+            self.contradicted[pair] += close is not None
+            if self.contradicted[pair] < _CONTRADICTED:  # of thousands of lights each would be looked at
+                self._put_back(queue, (offer.cost, offer.least, *offer.order))
         return None
 
     def _probed(self, offer: Offer) -> Offer | None:
