@@ -25,7 +25,8 @@ from scenes import status
 
 _GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
-_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
+_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache; fewer of more than ...
+_MOST_PIXELS = 1 << 23  # ... pixels, 64 MiB, for where edges are sought anew images are copied, pass by pass
 _KEPT = 64  # estimators
 _TOOLS: OrderedDict[tuple[int, str, float], Estimator | ArrangementEstimator] = OrderedDict()
 _RARE = 1e-6  # probability below which no image is looked at from elsewhere
@@ -67,7 +68,8 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
     tool = prepared(layout, name, threshold)
     if isinstance(tool, ArrangementEstimator):
         return find_arranged(images, layout, tool)
-    parts = [_find(images[i : i + _BATCH], layout, name, threshold, _PASSES) for i in range(0, len(images), _BATCH)]
+    size = min(_BATCH, max(_MOST_PIXELS // images[0].size, 1)) if len(images) else _BATCH
+    parts = [_find(images[i : i + size], layout, name, threshold, _PASSES) for i in range(0, len(images), size)]
     found = Shape(**{key: np.concatenate([vars(part)[key] for part in parts]) for key in vars(parts[0])})
     return _judged(found, images, layout) if judged and name == "strip" and layout.arrangement else found
 
