@@ -42,11 +42,13 @@ def _crossings():
     rng = np.random.default_rng(5)
     x = np.linspace(-3, 3, 25)
     rows = -np.tanh(x - np.array([[0.31], [-0.77], [1.1], [0.0]])) + rng.normal(0, 0.02, (4, 25))
-    best = crossings.bracket(rows)
+    one = rows[..., None]  # image
+    best = crossings.bracket(one)
     places, normals = rng.uniform(6, 14, (3, 2)), np.array([[1.0, 0], [0.6, 0.8], [-0.8, 0.6]])
     return {
         "polarity": crossings.polarity(rows), "rise": crossings.rise(rows), "reversed": crossings.is_reversed(rows),
-        "bracket": best, "refined": crossings.refine(rows, best[0], np.zeros(4)),
+        "bracket": tuple(each[:, 0] for each in best),
+        "refined": crossings.refine(one, best[0], np.zeros((4, 1)))[:, 0],
         "weights": crossings.cubic_weights(np.array([0.1, 0.5, 0.83])),
         "across": windows.places_across(places, normals, 1.7),
         "rows": crossing.gaussian_rows(places, 1.3, (20, 22)).toarray(),
