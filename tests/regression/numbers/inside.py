@@ -48,7 +48,7 @@ def _crossings():
     return {
         "polarity": crossings.polarity(rows), "rise": crossings.rise(rows), "reversed": crossings.is_reversed(rows),
         "bracket": tuple(each[:, 0] for each in best),
-        "refined": crossings.refine(one, best[0], np.zeros((4, 1)))[:, 0],
+        "refined": tuple(each[:, 0] for each in crossings.refine(one, best[0], np.zeros((4, 1)))),
         "weights": crossings.cubic_weights(np.array([0.1, 0.5, 0.83])),
         "across": windows.places_across(places, normals, 1.7),
         "rows": crossing.gaussian_rows(places, 1.3, (20, 22)).toarray(),
