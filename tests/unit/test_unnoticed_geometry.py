@@ -177,7 +177,7 @@ def test_a_backlight_is_dark_beside_its_cone(monkeypatch):
     scene = scenes.load("backlight_plate")
     setting = scene.settings[0]
 
-    def shining(part, crop, quality, which):
+    def shining(part, crop, quality, which, **how):
         return np.full([each.stop - each.start for each in crop], 50.0 if part.silhouette else 0.0)
 
     monkeypatch.setattr(renderer, "fine_image", shining)

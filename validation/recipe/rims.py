@@ -26,7 +26,7 @@ class FoundRim(NamedTuple):
     displaced: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RimOptics:
     """What the least squares ask of camera and locator: noise, and the lens' blur at the places, px."""
 

@@ -19,7 +19,7 @@ _CALLED = ("sqrt", "sin", "cos", "tan", "arctan2", "hypot")
 _IN_MATH = {"arctan2": "atan2"}
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Tape:
     """Every operation once, in order.
 
