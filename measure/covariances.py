@@ -30,3 +30,12 @@ def scaled(covariance: np.ndarray, propagated: np.ndarray, which: np.ndarray) ->
     usable = which & np.isfinite(own) & (own > 0) & np.isfinite(told)
     factor = np.sqrt(np.divide(told, own, out=np.ones(own.shape), where=usable))
     return covariance * factor[..., :, None] * factor[..., None, :]
+
+
+def less_bias(
+    value: np.ndarray, covariance: np.ndarray, off: np.ndarray, propagated: np.ndarray, doubtful: np.ndarray,
+    measured: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Values (..., M) with their biases ``off`` taken off, and their covariances: variances of what is ``doubtful`` by
+    itself are the propagated ones; what is not ``measured``, bool (..., M) both, is no number."""
+    return np.where(measured, value - off, np.nan), of_measured(scaled(covariance, propagated, doubtful), measured)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from measure.covariances import of_measured, scaled
+from measure.covariances import less_bias, of_measured
 from measure.estimators.registry import best_estimator
 from measure.features.forms import FoundForm
 from measure.known_bias import Correction
@@ -190,14 +190,16 @@ def corrected(found: Measurements, correction: Correction, image: np.ndarray) ->
     states = np.array([correction.status_of(*each) for each in told]).reshape(shape)
     off, off_image = (np.nan_to_num(each).reshape(shape) for each in (off, off_image))
     doubtful, measured = np.isin(found.status, (status.CLUTTER, status.MISFIT)), np.isin(states, status.MEASURED)
-    spread = scaled(found.covariance, correction.covariance, doubtful)
-    spread_image = scaled(found.covariance_image, correction.covariance_image, doubtful)
+    value, covariance = less_bias(found.value, found.covariance, off, correction.covariance, doubtful, measured)
+    value_image, covariance_image = less_bias(
+        found.value_image, found.covariance_image, off_image, correction.covariance_image, doubtful, measured
+    )
     return replace(
         found,
-        value=np.where(measured, found.value - off, np.nan),
-        value_image=np.where(measured, found.value_image - off_image, np.nan),
-        covariance=of_measured(spread, measured),
-        covariance_image=of_measured(spread_image, measured),
+        value=value,
+        value_image=value_image,
+        covariance=covariance,
+        covariance_image=covariance_image,
         status=states,
         first=found.first and _first_corrected(found.first, off_image[..., 0], states[..., 0]),
         bias=off,

@@ -23,7 +23,7 @@ COMPONENTS = ("repeats", "operators x parts", "operators", "parts")
 _FIELDS = ("repeats", "both", "operators", "parts")  # of `Components`, in that order
 CUSTOMARY = (3, 10, 3)  # operators, parts, repeats of AIAG's study
 LEVEL = 0.01  # that any component of a study as predicted is called too large
-_MOST = (40, 60, 5)  # operators, parts, repeats of a study that can be made
+LARGEST = (40, 60, 5)  # operators, parts, repeats of a study that can be made
 
 
 Count: TypeAlias = "int | np.ndarray"
@@ -235,14 +235,14 @@ def found_by(
 
 def smallest_study(predicted: Components, sure: float = 0.9, times: float = 2.0) -> tuple[int, int, int] | None:
     """Operators, parts and repeats of the study of fewest values that names each component which is so many times
-    as large as predicted at least this likely (`found_by`); None where 40 operators, 60 parts and 5 repeats do not.
+    as large as predicted at least this likely (`found_by`); None where the `LARGEST` does not.
 
     Examples
     --------
     >>> smallest_study(Components(1.0, 0.5, 0.8, 4.0))
     (19, 18, 2)
     """
-    o, p, r = np.ogrid[2 : _MOST[0] + 1, 2 : _MOST[1] + 1, 2 : _MOST[2] + 1]
+    o, p, r = np.ogrid[2 : LARGEST[0] + 1, 2 : LARGEST[1] + 1, 2 : LARGEST[2] + 1]
     likely = found_by(predicted, o, p, r, times)
     good = np.min(list(likely.values()), axis=0) >= sure if likely else np.ones((1, 1, 1), bool)
     values = np.where(good, o * p * r, np.inf)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from measure.adjustment import Adjusted, Adjustment
-from measure.covariances import of_measured, scaled, spread
+from measure.covariances import less_bias, of_measured, spread
 from measure.features.aligned import Aligned
 from measure.features.rim_fit import Curve, RimFit
 from measure.known_bias import Correction
@@ -192,8 +192,7 @@ class Recipe:
             states = _after(told, states, of, u_bias)
             off, u_bias = np.where(np.isnan(off), 0.0, off), np.where(of, u_bias, np.inf)
             measured = _are(states, status.MEASURED)
-            value = np.where(measured, value - off, np.nan)
-            covariance = of_measured(scaled(covariance, told.covariance, doubtful), measured)
+            value, covariance = less_bias(value, covariance, off, told.covariance, doubtful, measured)
         sigma = np.sqrt(np.diag(covariance))
         there = with_budget(self.characteristics, sigma.tolist(), self.facts["whole"])
         doubts = [None] * len(value) if u_bias is None else u_bias.tolist()

@@ -8,7 +8,16 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.uncertainty.msa import COMPONENTS, Checked, Guard, Study, found_by, smallest_study, too_large
+from planner.uncertainty.msa import (
+    COMPONENTS,
+    LARGEST,
+    Checked,
+    Guard,
+    Study,
+    found_by,
+    smallest_study,
+    too_large,
+)
 from scenes.status import is_trusted, legend
 from validation.msa import Predicted
 from validation.report import cells
@@ -59,7 +68,7 @@ def power(each: Predicted, size: tuple[int, int, int]) -> str:
     if not likely:
         return f"{each.name}: nothing is predicted that a study could find."
     rates = ", ".join(f"{name} {cells.percent(float(p))}" for name, p in likely.items())
-    needed = "no study of up to 40 operators, 60 parts, 5 repeats names" if least is None else f"{_sized(least)} name"
+    needed = f"no study of up to {_sized(LARGEST)} names" if least is None else f"{_sized(least)} name"
     return f"{each.name}: {_sized(size)} name a component twice as large with: {rates}; {needed} each with 90 %."
 
 

@@ -27,17 +27,12 @@ _LABEL = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.
 def draw(scene: Scene, sensor: Pose, path: Path) -> Path:
     """Draw what the sensor sees of the object, its parts in colours by kind, with their names; a PNG file."""
     view = _View(scene, sensor)
-    shown = (
-        scene.solid.vertices
-        if (board := scene.placement.board) is None
-        else np.concatenate([scene.solid.vertices, board.outline])
-    )
-    low, high = (f(view.image(shown), axis=0) for f in (np.nanmin, np.nanmax))
+    low, high = (f(view.image(corners(scene)), axis=0) for f in (np.nanmin, np.nanmax))
     across, down = np.maximum(high - low, 1e-9)
     height = np.clip(0.85 * WIDTH * down / across, *_HEIGHTS)
     figure, axis = plt.subplots(figsize=(WIDTH, height + _AROUND), layout="constrained")
-    if board is not None:
-        _board(axis, view, board)
+    if scene.placement.board is not None:
+        _board(axis, view, scene.placement.board)
     _faces(axis, view)
     for edge in scene.solid.sharp:
         _edge(axis, view, edge)
@@ -136,6 +131,12 @@ def _faces(axis, view: _View) -> None:
     order = order[shown[solid.triangle_faces[order]]]
     greys = [str(grey) for grey in 0.55 + 0.37 * cosines[order]]
     axis.add_collection(PolyCollection(corners[order], facecolors=greys, edgecolors=greys, linewidths=0.5))
+
+
+def corners(scene: Scene) -> np.ndarray:
+    """Of part and board, (n, 3)."""
+    board = scene.placement.board
+    return scene.solid.vertices if board is None else np.concatenate([scene.solid.vertices, board.outline])
 
 
 def _board(axis, view: _View, board: Board) -> None:

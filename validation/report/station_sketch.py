@@ -8,8 +8,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from imaging.geometry.projection import sensor_position
 from imaging.pictures import Pictures
-from scenes import Picture, Scene
+from scenes import Picture
 from validation.report.canvas import TEXT, inline, plt
+from validation.report.scene_figure import corners
 
 _SIZE = 2.3, 2.2  # inches of a view
 _STEPS = np.array([1.0, 2.0, 5.0, 10.0])  # of a scale's length, times a power of ten
@@ -77,13 +78,7 @@ def _panel(axis, flat: np.ndarray, picture: Picture, eye: np.ndarray, lamps: lis
         axis.plot(*points.T, "*" if single else ".", color=_LAMP, ms=12 if single else 3, ls="")
     axis.plot(*camera, "s", color=_CAMERA, ms=9)
     places = [("camera", camera, _CAMERA), *(("lamp", lamp.mean(0) @ flat, _LAMP) for lamp in lamps[:1])]
-    _labels(axis, places, _shown(scene) @ flat, middle)
-
-
-def _shown(scene: Scene) -> np.ndarray:
-    """Corners (n, 3) of part and board."""
-    board = scene.placement.board
-    return scene.solid.vertices if board is None else np.concatenate([scene.solid.vertices, board.outline])
+    _labels(axis, places, corners(scene) @ flat, middle)
 
 
 def _part(axis, points: np.ndarray) -> None:
