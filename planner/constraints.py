@@ -142,11 +142,12 @@ class Constraints:
 
     def allows(self, scene: Scene, sensor: np.ndarray, light: np.ndarray) -> bool:
         """Whether one setting, a sensor (2,) and the free lights (2 F,), is allowed."""
-        return bool(
-            self.sensors(scene, sensor[None])[0]
-            and self.lights(light.reshape(-1, 2)).all()
-            and self.pairs(scene, sensor, light)
-        )
+        return bool(self.allowed(scene, sensor[None], light[None])[0])
+
+    def allowed(self, scene: Scene, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+        """Which settings, sensors (n, 2) and the free lights (n, 2 F), are allowed; bool, shape (n,)."""
+        lit = self.lights(lights.reshape(-1, 2)).reshape(len(lights), -1).all(-1)
+        return self.sensors(scene, sensors) & lit & self.pairs(scene, sensors, lights)
 
 
 def _check(good: bool, name: str, must: str, got: object) -> None:

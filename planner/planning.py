@@ -292,9 +292,8 @@ def _refined(best: Searched, begin: RayTraced, others: tuple[Candidate, ...]) ->
         for c in others
         if c.edges == required and np.isfinite(c.variance)
     ]
-    ends = [refine(best.problem, pair, step, sizes=(0.7,), known=known) for *pair, known in starts]
+    ends = [refine(best.problem, pair, step, known=known) for *pair, known in starts]
     end = min(ends, key=lambda each: each.value)
-    end = refine(best.problem, (end.sensor, end.lights), step, sizes=(0.1,), known=end.value)
     found = RayTraced.of(best.problem, end.sensor, end.lights)
     return begin if found.untrusted > begin.untrusted else found
 

@@ -12,6 +12,7 @@ import numpy as np
 from imaging.light.emitters import Emitter
 from scenes import Brdf, Luminaire, Scene
 from scenes.materials.brdf import Index
+from scenes.materials.vectors import dot
 
 
 class Beam(NamedTuple):
@@ -34,13 +35,22 @@ def beam(emitter: Emitter, points: np.ndarray, axes: int = 0, *, fall_off: bool 
 
     ``axes`` is how many axes the points have of their own, behind those of the pictures.
     """
-    away = widened(np.asarray(emitter.at), axes) - points
-    distance = np.linalg.norm(away, axis=-1)
-    to_light = away / distance[..., None]
+    to_light, distance = _directions(widened(np.asarray(emitter.at), axes), points)
     strength = emitter.power / (distance if fall_off else emitter.distance) ** 2
     if emitter.axis is not None:
         strength = strength * emitter.light.profile(-(to_light * widened(np.asarray(emitter.axis), axes)).sum(-1))
     return Beam(to_light, strength)
+
+
+def _directions(place: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (..., 3) from points (..., 3) towards a place, and distances (...): a component at a time, which
+    NumPy does two times as fast."""
+    away = [place[..., i] - points[..., i] for i in range(3)]
+    distance = np.sqrt(dot(away, away))
+    found = np.empty((*distance.shape, 3))
+    for i, each in enumerate(away):
+        np.divide(each, distance, out=found[..., i])
+    return found, distance
 
 
 def widened(values: np.ndarray, axes: int) -> np.ndarray:

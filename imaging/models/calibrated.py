@@ -9,7 +9,7 @@ from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kapp
 from imaging.features.measurand import normals
 from imaging.light.appearance import is_separable
 from imaging.models.along import NODE_WEIGHTS, Along, EdgeNodes
-from imaging.models.errors import Errors, combined
+from imaging.models.errors import Errors, LineVariance, combined
 from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
 from imaging.row_noise import of_lines, of_points
@@ -52,9 +52,9 @@ def _calibrated(pictures: Pictures) -> Errors:
                 variance[short] = _double_integral(*_picked(nodes, weight * np.sqrt(per_point), short), scale)
             if not is_separable(scene):
                 rough = squared.max(-1) > ROUGH * squared.min(-1)
-                kept = squared >= MIN_CONTRAST**2 * noise
-                first_order = _first_order(nodes, a, b, per_point, kept)
-                variance = np.where(rough, 2 * np.sqrt(np.pi) * scale * first_order, variance)
+                if rough.any():
+                    first_order = _first_order(nodes, a, b, per_point, squared >= MIN_CONTRAST**2 * noise)
+                    variance = np.where(rough, 2 * np.sqrt(np.pi) * scale * first_order, variance)
             if scene.noise.is_shared:
                 variance = variance + _of_shared(pictures, along, a, b)
         return np.where(weak, np.inf, variance)
@@ -65,7 +65,24 @@ def _calibrated(pictures: Pictures) -> Errors:
             shared = of_points(noise, circle.place, circle.normal, circle.arc, circle.blur, scale)
         return calibrated_circle(circle, kappa2(scale, circle.blur), scale, MIN_CONTRAST**2, shared)
 
-    return combined(pictures, line_variance, squared.mean(-1), noise.mean(-1), found)
+    return combined(pictures, _quadratic(line_variance, nodes), squared.mean(-1), noise.mean(-1), found)
+
+
+def _quadratic(variance: LineVariance, nodes: EdgeNodes) -> LineVariance:
+    """The same, from three of them: variances of A d + B theta are quadratic in A and B."""
+    length = nodes.length[..., 0]
+    one, none = np.ones(length.shape), np.zeros(length.shape)
+    moved, turned, both = (variance(*each) for each in ((one, none), (none, length), (one, length)))
+    with np.errstate(invalid="ignore"):
+        mixed = both - moved - turned
+
+    def of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            turn = b / length
+            found = a * (a * moved + turn * mixed) + turn**2 * turned
+        return np.where(np.isfinite(found), found, np.inf)
+
+    return of
 
 
 def _of_shared(pictures: Pictures, along: Along, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -92,7 +92,7 @@ class Errors:
         """Variances of all quantities in the object by what is not known of the part's place, (..., M); 0 where it is
         known."""
         if self.adjustment is None:
-            return np.zeros(self.variances.shape)
+            return np.zeros(self.variances_object.shape)
         return np.einsum("...mm->...m", self.adjustment.placed(self.measurands.gradient_object))
 
     def _of_features(self) -> np.ndarray:

@@ -278,8 +278,7 @@ class SettingUp:
         """Settings (n, 2) and (n, 2 F) to the digits of poses, where that keeps the constraints; what is held stays."""
         scene, limits = self.problem.scene, self.problem.constraints
         near = sensors if self.held[0] else rounded(sensors), lights if self.held[1] else rounded(lights)
-        keeps = limits.sensors(scene, near[0]) & limits.pairs(scene, *near)
-        keeps &= limits.lights(near[1].reshape(-1, 2)).reshape(len(lights), -1).all(-1)
+        keeps = limits.allowed(scene, *near)
         kept = [np.where(keeps[:, None], one, other) for one, other in zip(near, (sensors, lights), strict=True)]
         return kept[0], kept[1]
 

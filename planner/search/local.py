@@ -1,4 +1,5 @@
-"""Local searches: downhill below the grid, and the paper's from neighbour to neighbour (its Figs 7 and 8)."""
+"""Local searches: downhill below the grid, many settings or one at a time, and the paper's from neighbour to neighbour
+(its Figs 7 and 8)."""
 
 from __future__ import annotations
 
@@ -15,7 +16,12 @@ from scenes import InvalidInput, Pose
 
 _MOST_TURNS = 100
 Value = Callable[[np.ndarray, np.ndarray], float]
+Values = Callable[[np.ndarray, np.ndarray], np.ndarray]
 _MOST = np.finfo(float).max  # instead of infinity, of which a simplex makes NaN
+_RADIUS, _LEAST_RADIUS = 0.7, 0.01  # units: of the first settings that are asked, and of the last
+_NEARER, _SHRUNK = 1 / 3, 1 / 4  # of the radius: a second shell, and the next one where neither gained anything
+_BASES = 3  # orthogonal bases, each way, of the directions that are asked at a time
+_GAIN, _MOST_POLLS = 1e-4, 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,15 +84,76 @@ class Refined(NamedTuple):
 
 def refine(
     problem: SearchProblem, pair: Sequence[np.ndarray], step_deg: float, *, value: Value | None = None,
-    sizes: Sequence[float] = (0.7, 0.1), known: float = np.inf,
+    sizes: Sequence[float] = (_RADIUS, 0.1), known: float = np.inf,
 ) -> Refined:  # fmt: skip
-    """Below a grid of ``step_deg``: `descend` from a sensor (2,) and free lights (2 F,), within the constraints.
+    """Below a grid of ``step_deg``, from a sensor (2,) and free lights (2 F,), within the constraints.
 
-    ``value`` of sensor and lights is minimised, what the problem minimises where it is not given.
+    What the problem minimises goes down by `poll`; a ``value`` of sensor and lights by `descend`, with ``sizes``.
     """
     start = Start(*pair, same_mount=problem.constraints.same_mount, unit_deg=step_deg)
-    wanted = problem.value_from(*pair) if value is None else problem.where_feasible(value)
+    if value is None:
+        return poll(start, problem.values_from(*pair), known=known)
+    wanted = problem.where_feasible(value)
     return descend(start, lambda sensor, lights, _: wanted(sensor, lights), sizes=sizes, known=known)
+
+
+def poll(start: Start, values: Values, *, known: float = np.inf) -> Refined:
+    """Mesh adaptive direct search (Audet and Dennis, SIAM J. Optim. 17, 2006) from a start.
+
+    Settings in seeded random directions are asked together, which takes hardly longer than one; the best is the next
+    place, and where none is better they come nearer.
+
+    Parameters
+    ----------
+    start : Start
+        Without angles.
+    values : callable
+        Sensors (n, 2) and lights (n, 2 F) to what is minimised, (n,); infinite where not feasible.
+    known : float
+        As of `descend`.
+
+    Raises
+    ------
+    InvalidInput
+        If the beginning is not feasible, or nothing can be measured there.
+    """
+
+    def told(places: np.ndarray) -> np.ndarray:
+        sensors, lights, _ = zip(*map(start.at, places), strict=True)
+        found = values(np.array(sensors), np.array(lights))
+        return np.where(np.isnan(found), np.inf, found)
+
+    place, radius = np.zeros(start.count), _RADIUS
+    least = _beginning(start, float(told(place[None])[0]), known)
+    for turn in range(_MOST_POLLS if start.count else 0):
+        ways = _directions(start.count, turn)
+        asked = place + radius * np.concatenate([ways, _NEARER * ways])
+        found = told(asked)
+        best = int(found.argmin())
+        if found[best] < (1 - _GAIN) * least:
+            place, least = asked[best], float(found[best])
+            radius *= 1 if best < len(ways) else 0.5
+        elif radius > _LEAST_RADIUS:
+            radius *= _SHRUNK
+        else:
+            break
+    return Refined(*start.at(place), least)
+
+
+def _directions(count: int, turn: int) -> np.ndarray:
+    """Unit vectors (n, count), both ways along the axes of orthogonal bases that differ from turn to turn."""
+    drawn = np.random.default_rng(turn).normal(size=(_BASES, count, count))
+    ways = np.linalg.qr(drawn)[0].reshape(-1, count)
+    return np.concatenate([ways, -ways])
+
+
+def _beginning(start: Start, value: float, known: float) -> float:
+    """What is minimised at a start, or what a search found there."""
+    found = value if np.isfinite(value) else known
+    if not np.isfinite(found):
+        place = f"{start.sensor}, {start.lights}"
+        raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {place}")
+    return found
 
 
 def descend(
@@ -122,13 +189,8 @@ def descend(
     InvalidInput
         If the beginning is not feasible, or nothing can be measured there.
     """
-    begin = np.zeros(start.count)
-    unit = value(*start.at(begin))
-    unit = unit if np.isfinite(unit) else known
-    if not np.isfinite(unit):
-        place = f"{start.sensor}, {start.lights}"
-        raise InvalidInput(f"refinement must begin at a pose that is allowed and measurable, got {place}")
-    least = 1.0
+    begin, least = np.zeros(start.count), 1.0
+    unit = _beginning(start, value(*start.at(begin)), known)
 
     def cost(x: np.ndarray) -> float:
         nonlocal least

@@ -147,23 +147,23 @@ class SearchProblem:
             yield part, self.errors(*both), self.feasible(*both)
             report("evaluating pairs", min(at + size, len(sensors)), len(sensors))
 
-    def value_from(self, sensor: np.ndarray, light: np.ndarray) -> Callable[[np.ndarray, np.ndarray], float]:
-        """What a local search from a setting minimises: infinite where not feasible, or where levels are cut off.
+    def values_from(self, sensor: np.ndarray, light: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """What a local search from a setting minimises, of sensors (n, 2) and lights (n, 2 F): infinite where these do
+        not keep the constraints, or where levels are cut off.
 
         The latter only if they are not cut off where it begins.
         """
+        anyway = cut_off(self.errors(sensor[None], light[None]), self.scene)[0]
 
-        def told(s: np.ndarray, k: np.ndarray) -> tuple[float, bool]:
-            errors = self.errors(s[None], k[None])
-            return float(minimised(errors, self.objective)[0]), bool(cut_off(errors, self.scene)[0])
+        def values(s: np.ndarray, k: np.ndarray) -> np.ndarray:
+            found, allowed = np.full(len(s), np.inf), self.constraints.allowed(self.scene, s, k)
+            if allowed.any():
+                errors = self.errors(s[allowed], k[allowed])
+                cut = cut_off(errors, self.scene) & ~anyway
+                found[allowed] = np.where(cut, np.inf, minimised(errors, self.objective))
+            return found
 
-        anyway = told(sensor, light)[1]
-
-        def value(s: np.ndarray, k: np.ndarray) -> float:
-            found, cut = told(s, k)
-            return np.inf if cut and not anyway else found
-
-        return self.where_feasible(value)
+        return values
 
     def where_feasible(
         self, value: Callable[[np.ndarray, np.ndarray], float]
