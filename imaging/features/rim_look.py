@@ -27,12 +27,13 @@ _SHARES = np.exp(-(_BESIDE**2) / 2) / np.exp(-(_BESIDE**2) / 2).sum()
 _MIDDLE = len(_BESIDE) // 2
 _CELL, _CELLS = 0.2, 24  # standard deviations that a ray stands for, and how many on each side
 _MIDDLES = _CELL * (np.arange(-_CELLS, _CELLS) + 0.5)
+_ENDS = _CELL * np.arange(1 - _CELLS, _CELLS)  # between them
 _SPREAD = 0.2  # of lines beside each other, towards a small rim's middle: it is no less
 _TURN = 1e-3  # part of a rim's turn that its bend is told by
 _MOST_BEYOND = 64  # lines beyond each end of an arc
 _APART, _DIGITS = 0.6, 6  # standard deviations between lines around the rim at most, where not more than 11 a place
 _SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
-_STEPS = 8  # of Newton's method
+_STEPS, _CONVERGED = 8, 1e-12  # of Newton's method, and moves that are rounding, standard deviations
 _FARTHEST = 0.2  # px that a crossing may be moved: levels are known to a few percent, and so is the move
 _KNOWN = 0.05  # part of the brighter side that a contrast must have: levels so alike may be the other way round
 _STEEPER = 0.3  # by which the slope there may differ from a lone step's
@@ -103,7 +104,8 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     where = outline_beside(pictures, circle, places, normals, width[:, None] * _BESIDE) / width[:, None]
     levels = _levels(pictures, circle, angle, places, normals, width)
     alone = zero_of_steps(where, _SHARES)
-    crossing, slope = _zero(levels, where, alone)
+    steps = _steps(levels)
+    crossing, slope = _zero(steps, where, alone)
     sides = levels[:, _MIDDLE, [_CELLS - 1, _CELLS]].T
     noise = sensor.recorded(scene.noise, scene.noise.dark_level + sides).noise_variance
     moved = (crossing - alone) * width
@@ -111,7 +113,7 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
         good = (np.abs(slope / (sides[1] - sides[0]) - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)
     good &= np.abs(sides[1] - sides[0]) >= _KNOWN * sides.max(0)
     good &= sides.max(0) <= sensor.headroom(scene.noise)
-    good &= _steepest(levels, where, crossing, slope, scene.locator.window_px / width)
+    good &= _steepest(steps, where, crossing, slope, scene.locator.window_px / width)
     good &= scene.camera.aperture_radius == 0  # of a cone of light the wall beside takes a part that is not known
     shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
     noise = np.broadcast_to(noise, sides.shape).mean(0)
@@ -252,34 +254,40 @@ def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     return found
 
 
-def _zero(levels: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Zero crossing of the second derivative of levels (n, J, 2 cells) about steps at ``where`` (n, J), in standard
-    deviations, and the contrast of a lone step that has its slope there."""
+def _steps(levels: np.ndarray) -> np.ndarray:
+    """From each cell to the next (n, J, 2 cells - 1), as the lines of levels (n, J, 2 cells) beside each other count."""
+    return np.diff(levels) * _SHARES[:, None]
+
+
+def _zero(steps: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Zero crossing of the second derivative of steps (n, J, 2 cells - 1) about outlines at ``where`` (n, J), in
+    standard deviations, and the contrast of a lone step that has its slope there."""
     found = start.copy()
     for _ in range(_STEPS):
-        value, slope = _second(levels, where, found)
+        value, slope = _second(steps, where, found)
         with np.errstate(divide="ignore", invalid="ignore"):
-            step = np.where(slope != 0, value / slope, np.nan)
-        found = found - np.clip(step, -0.5, 0.5)
+            move = np.clip(np.where(slope != 0, value / slope, np.nan), -0.5, 0.5)
+        found = found - move
+        if not (np.abs(move) > _CONVERGED).any():
+            break
     return found, -slope
 
 
-def _second(levels: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _second(steps: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Second derivative of the blurred levels at ``at`` (n,) and its slope there, (n,), as of lone steps."""
-    away = where[..., None] + _CELL * np.arange(-_CELLS, _CELLS + 1) - at[:, None, None]
-    bell = np.exp(-(away**2) / 2)
-    first, second = -away * bell, (away**2 - 1) * bell  # of the bell, by the ends; both 0 at infinity
-    first[..., [0, -1]] = second[..., [0, -1]] = 0.0
-    value, slope = (np.einsum("j,njc,njc->n", _SHARES, levels, np.diff(v)) for v in (first, -second))
-    return value, slope
+    away = where[..., None] + (_ENDS - at[:, None, None])
+    squared = away**2
+    bell = steps * np.exp(-squared / 2)
+    value, slope = (np.einsum("njc,njc->n", bell, each) for each in (away, squared))
+    return value, slope - bell.sum((1, 2))
 
 
-def _steepest(levels, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
+def _steepest(steps, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
     """Whether no other crossing in the search window (n,) is nearly as steep, which noise would let win, (n,)."""
-    steps = np.linspace(-1, 1, _LOOKED)
-    told = np.stack([_second(levels, where, step * window)[0] for step in steps], 1) * np.sign(slope)[:, None]
+    places = np.linspace(-1, 1, _LOOKED)
+    told = np.stack([_second(steps, where, place * window)[0] for place in places], 1) * np.sign(slope)[:, None]
     left, right = told[:, :-1], told[:, 1:]
-    size = window * (steps[1] - steps[0])
+    size = window * (places[1] - places[0])
     fall = np.where((left >= 0) & (right < 0), (left - right) / size[:, None], 0.0)
-    others = np.abs((steps[:-1] + steps[1:]) / 2 * window[:, None] - crossing[:, None]) > size[:, None]
+    others = np.abs((places[:-1] + places[1:]) / 2 * window[:, None] - crossing[:, None]) > size[:, None]
     return (fall * others).max(1) <= _RIVAL * np.abs(slope)
