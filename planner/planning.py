@@ -284,7 +284,7 @@ def _found(best: Searched, searches: list[Searched]) -> dict[str, Any]:
 
 
 def _refined(best: Searched, begin: RayTraced, others: tuple[Candidate, ...]) -> RayTraced:
-    """The lowest end of local searches from the setting and others, unless less can be trusted there."""
+    """The lowest end of local searches from the setting and others, unless a close look finds the setting better."""
     required, step = best.problem.scene.required, best.grid.step_deg
     starts = [(begin.sensor, begin.light, begin.value)]
     starts += [
@@ -295,7 +295,7 @@ def _refined(best: Searched, begin: RayTraced, others: tuple[Candidate, ...]) ->
     ends = [refine(best.problem, pair, step, known=known) for *pair, known in starts]
     end = min(ends, key=lambda each: each.value)
     found = RayTraced.of(best.problem, end.sensor, end.lights)
-    return begin if found.untrusted > begin.untrusted else found
+    return min(begin, found, key=lambda each: each.rank)
 
 
 def _set_up(setting_up: SettingUp, taken: RayTraced, others: tuple[Candidate, ...]) -> tuple[RayTraced, bool]:

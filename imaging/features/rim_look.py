@@ -255,7 +255,7 @@ def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
 
 
 def _steps(levels: np.ndarray) -> np.ndarray:
-    """From each cell to the next (n, J, 2 cells - 1), as the lines of levels (n, J, 2 cells) beside each other count."""
+    """From each cell to the next (n, J, 2 cells - 1), as lines of levels (n, J, 2 cells) beside each other count."""
     return np.diff(levels) * _SHARES[:, None]
 
 

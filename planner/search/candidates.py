@@ -135,11 +135,15 @@ class Candidate:
 
 
 def candidates(searches: Sequence[Searched], count: int = 10) -> tuple[Candidate, ...]:
-    """The best settings whose sensors or lights differ by 15 degrees, over all sets of required edges."""
+    """The best settings whose sensors or lights differ by 15 degrees, over all sets of required edges.
+
+    None of more than four times the least variance of a search, nor any that a close look finds not to measure.
+    """
     rows = sorted((row for each in searches for row in each.rows(count)), key=lambda row: row[0])
+    rows = [row for row in rows if row[0] <= DEAREST * rows[0][0]]
     chosen = distinct(rows, _differ, 2 * count)
     made = [_candidate(searched, sensor, light) for _, searched, sensor, light in chosen]
-    return tuple(sorted(made, key=lambda c: c.variance)[:count])
+    return tuple(sorted((c for c in made if np.isfinite(c.variance)), key=lambda c: c.variance)[:count])
 
 
 def _candidate(searched: Searched, sensor: np.ndarray, light: np.ndarray) -> Candidate:
@@ -193,6 +197,11 @@ class RayTraced(NamedTuple):
     value: float
     untrusted: int
 
+    @property
+    def rank(self) -> tuple[int, float]:
+        """The least is the best: of fewest measurands that are not ``ok`` the least that is minimised."""
+        return self.untrusted, self.value
+
     @classmethod
     def of(cls, problem: SearchProblem, sensor: np.ndarray, light: np.ndarray) -> RayTraced:
         """Of a sensor (2,) and the free lights (2 F,), degrees."""
@@ -209,6 +218,8 @@ def trusted(
 ) -> tuple[RayTraced, tuple[Candidate, ...]]:
     """The setting with the fewest measurands that are not ``ok``, the best of them, and the better ones set aside.
 
+    The search glanced at all of them: looked at closely, another one than its best may have the least variance.
+
     Parameters
     ----------
     best : RayTraced
@@ -216,19 +227,18 @@ def trusted(
     choice : sequence of Candidate
         The others, the best first; none of more than 4 times ``variance`` is taken.
     """
-    least, passed, set_aside = best, [], ()
+    least, passed = best, []
     for candidate in choice:
-        if least.untrusted == 0 or candidate.variance > DEAREST * variance:
+        if candidate.variance > DEAREST * variance or (least.untrusted == 0 and candidate.variance >= least.value):
             break
         if candidate.edges != problem.scene.required:
             continue
         poses = np.array(list(candidate.sensor)), as_array(candidate.light)
         if not all(np.allclose(pose, own, atol=10.0**-DIGITS) for pose, own in zip(poses, best[:2], strict=True)):
             other = RayTraced.of(problem, *poses)
-            if other.untrusted < least.untrusted:
-                least, set_aside = other, tuple(passed)
+            least = min(least, other, key=lambda each: each.rank)
         passed.append(candidate)
-    return least, set_aside
+    return least, tuple(each for each in passed if each.variance < least.value)
 
 
 @dataclass(frozen=True, eq=False)

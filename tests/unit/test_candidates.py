@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from planner.search import candidates
+from scenes import Pose
 
 POLES = [(20.0 * k, 7.0) for k in range(1, 9)]  # further apart than candidates have to be
 
@@ -20,7 +21,7 @@ def told(monkeypatch):
 
 def searched(*poles):
     """A search that gives its settings in the order of its own, faster evaluation."""
-    rows = [(float(k), None, np.array(pose), np.array([50.0, 300.0])) for k, pose in enumerate(poles)]
+    rows = [(1 + 0.1 * k, None, np.array(pose), np.array([50.0, 300.0])) for k, pose in enumerate(poles)]
     made = SimpleNamespace(problem=None)
     made.rows = lambda count: [(value, made, *pair) for value, _, *pair in rows]
     return made
@@ -31,6 +32,46 @@ def test_twice_as_many_are_looked_at_as_are_named():
     """Of eight the first four, of which the last two are the best."""
     found = candidates.candidates([searched(*POLES)], 2)
     assert [tuple(each.sensor) for each in found] == [POLES[3], POLES[2]]
+
+
+@pytest.mark.usefixtures("told")
+def test_what_is_four_times_as_dear_is_not_looked_at():
+    """Nor would it be taken: here the last, which would be the best."""
+    rows = [(value, None, np.array(pose), np.zeros(2)) for value, pose in zip((1.0, 3.9, 4.1), POLES, strict=False)]
+    made = SimpleNamespace(problem=None)
+    made.rows = lambda count: [(value, made, *pair) for value, _, *pair in rows]
+    assert [tuple(each.sensor) for each in candidates.candidates([made], 3)] == [POLES[1], POLES[0]]
+
+
+def test_what_does_not_measure_when_it_is_looked_at_closely_is_not_named(monkeypatch):
+    def seen(_, sensor, light):
+        return SimpleNamespace(variance=np.inf if sensor[0] == POLES[0][0] else 1.0, sensor=sensor)
+
+    monkeypatch.setattr(candidates, "_candidate", seen)
+    assert [tuple(each.sensor) for each in candidates.candidates([searched(*POLES[:2])], 2)] == [POLES[1]]
+
+
+@pytest.mark.parametrize(
+    ("values", "untrusted", "taken", "aside"),
+    [((1.0, 0.8, 1.2), (0, 0, 0), 1, []), ((1.0, 0.8, 1.2), (0, 1, 0), 0, [1]), ((1.0, 1.1, 1.2), (1, 1, 0), 2, [1]),
+     ((1.0, 1.1, 4.1), (1, 1, 0), 0, [])],
+)  # fmt: skip
+def test_the_best_that_can_be_trusted_is_taken_by_a_close_look(monkeypatch, values, untrusted, taken, aside):
+    """Values of the search's best setting and of two others, and how many of their measurands are not ok."""
+    looks = [
+        candidates.RayTraced(np.array(pose), np.array([50.0, 300.0]), None, *known)
+        for pose, *known in zip(POLES, values, untrusted, strict=False)
+    ]
+    by_pose = {each.sensor[0]: each for each in looks}
+    monkeypatch.setattr(candidates.RayTraced, "of", lambda problem, sensor, light: by_pose[sensor[0]])
+    problem = SimpleNamespace(scene=SimpleNamespace(required=("e1",)))
+    choice = [
+        SimpleNamespace(sensor=POLES[k], light=Pose(50, 300), edges=("e1",), variance=values[k]) for k in (1, 2)
+    ]  # fmt: skip
+    choice.sort(key=lambda each: each.variance)
+    found, passed = candidates.trusted(problem, looks[0], choice, values[0])
+    assert found is looks[taken]
+    assert [POLES.index(each.sensor) for each in passed] == aside
 
 
 @pytest.mark.usefixtures("told")
