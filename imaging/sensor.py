@@ -23,14 +23,15 @@ class Levels(NamedTuple):
 
 
 def shot_noise(noise: Noise, signal: np.ndarray) -> np.ndarray:
-    """Variance that the light's own noise adds at grey levels above darkness: gain x signal."""
-    return noise.shot_gain * np.maximum(signal, 0.0)
+    """Variance that the light's own noise adds at grey levels above darkness: gain x signal, of a linear sensor."""
+    return noise.shot_variance(signal)
 
 
 def recorded(noise: Noise, level: np.ndarray) -> Levels:
     """What the sensor records of a noise-free image (grey levels, darkness included).
 
-    EMVA 1288: sigma_dark^2 + gain (level - dark level) + 1/12 for the rounding. Near the end of the scale a normal
+    EMVA 1288: sigma_dark^2 + gain (level - dark level) + 1/12 for the rounding, and the excess of a sensor that is not
+    linear. Near the end of the scale a normal
     distribution is cut off at 2^bits - 1, which lowers mean and variance. The cut at 0 is left out, for the level of
     darkness keeps the noise away from it; the fixed pattern does not vary.
     """
@@ -61,7 +62,7 @@ def sensitivity(noise: Noise, level: np.ndarray) -> np.ndarray:
     level = np.asarray(level, float)
     sigma = np.sqrt(np.maximum(noise.variance + shot_noise(noise, level - noise.dark_level), 1e-300))
     below = (full_scale(noise) - level) / sigma
-    grows = np.where(level > noise.dark_level, noise.shot_gain, 0.0) / (2 * sigma)
+    grows = noise.shot_slope(level - noise.dark_level) / (2 * sigma)
     return ndtr(below) - np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi) * grows
 
 

@@ -73,7 +73,7 @@ class FramePair:
 
 @dataclass(frozen=True)
 class PhotonTransfer:
-    """The noise of a sensor, and how far its variances are from a line.
+    """The noise of a sensor, how far its variances are from a line, and the noise that follows them.
 
     Attributes
     ----------
@@ -85,11 +85,15 @@ class PhotonTransfer:
     status : str
         ``misfit`` where that is beyond chance and more than 5 %: the sensor is not linear, and variances at some
         levels are as much off.
+    followed : Noise
+        The same with the ``excess`` by which each step's variance differs from the line: for a sensor that is not
+        linear.
     """
 
     noise: Noise
     bend: float
     status: str
+    followed: Noise
 
 
 def photon_transfer(lit: Sequence[FramePair], dark: Sequence[FramePair], bits: int | None = None) -> PhotonTransfer:
@@ -125,7 +129,15 @@ def photon_transfer(lit: Sequence[FramePair], dark: Sequence[FramePair], bits: i
     missed = np.abs((variance / (dark_variance.mean() + gain * np.maximum(signal, 0.0)))[used] - 1)
     chance = _SURE * np.sqrt(2 / np.array([pair.pixels for pair in lit])[used])
     bent = bool((missed > np.maximum(chance, _BENT)).any())
-    return PhotonTransfer(noise, float(missed.max()), status.MISFIT if bent else status.OK)
+    told = status.MISFIT if bent else status.OK
+    return PhotonTransfer(noise, float(missed.max()), told, _followed(noise, signal[used], extra[used]))
+
+
+def _followed(noise: Noise, signal: np.ndarray, extra: np.ndarray) -> Noise:
+    """The noise with what steps (n,) have beside gain x signal; as it is where light adds none."""
+    order = np.argsort(signal)
+    rows = [(0.0, 0.0), *((s, e - noise.gain * s) for s, e in zip(signal[order], extra[order], strict=True) if s > 0)]
+    return noise.tried(excess=tuple((float(s), float(e)) for s, e in rows)) if noise.gain > 0 else noise
 
 
 def _shared(parts: list[float]) -> float:

@@ -32,6 +32,7 @@ Level = Annotated[float, Field(ge=1e-15, le=1e15)]  # grey levels
 Coordinate = Annotated[float, Field(ge=-1e12, le=1e12)]  # in the scene's unit
 Spread = Annotated[float, Field(ge=0, le=1e12), _zero_or(1e-30)]  # a standard uncertainty, of any unit
 Rounding = Annotated[float, Field(ge=0, le=1e12), _zero_or(1e-29)]  # a step; half of it is a Spread
+Bounded = Annotated[float, Field(ge=-1e30, le=1e30)]  # grey levels^2
 Darkness = Annotated[float, Field(ge=0, le=1e15)]  # grey levels
 Trace = Annotated[float, Field(ge=0, le=1e15), AfterValidator(_none_or_some)]  # grey levels
 

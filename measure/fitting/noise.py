@@ -33,7 +33,8 @@ class Curve(NamedTuple):
     def noise(self, noise: Noise) -> Noise:
         """The sensor with this noise: rounding (1/12) is taken out of the temporal dark noise."""
         rounding = 0.0 if noise.bits is None else 1 / 12
-        return noise.model_copy(update={"sigma": float(np.sqrt(max(self.dark - rounding, 1e-12))), "gain": self.gain})
+        sigma = float(np.sqrt(max(self.dark - rounding, 1e-12)))
+        return noise.model_copy(update={"sigma": sigma, "gain": self.gain, "excess": ()})
 
 
 def by_repetition(shots: Shots, pixels: Pixels, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -70,8 +70,8 @@ class BestPair:
 
 
 def has_bound(scene: Scene, model: str) -> bool:
-    """Whether the fast search applies: a separable scene, straight edges only, a part whose place is known."""
-    placed = scene.placement.is_known
+    """Whether the fast search applies: a separable scene, straight edges only, a known place, a linear sensor."""
+    placed = scene.placement.is_known and not scene.noise.excess
     return placed and is_separable(scene) and lines_alone(scene) and model in ("paper", "calibrated")
 
 

@@ -27,7 +27,7 @@ def _relative(part: float, rest: float) -> Influence:
 
 
 class ShotNoise(Effect):
-    """Photons arrive at random: variance gain x signal."""
+    """Photons arrive at random: variance gain x signal, of a linear sensor."""
 
     name = "shot_noise"
     switch = "noise.gain in the exposure; costs nothing beside the rays"
@@ -39,7 +39,7 @@ class ShotNoise(Effect):
         return _relative(float(shot_noise(pictures.scene.noise, _brightest(pictures))), pictures.scene.noise.variance)
 
     def without(self, scene: Scene) -> Scene:
-        return changed(scene, "noise", gain=0.0)
+        return changed(scene, "noise", gain=0.0, excess=())
 
 
 class ReadNoise(Effect):

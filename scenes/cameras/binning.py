@@ -125,6 +125,8 @@ def _check(camera: dict[str, Any], raw: Noise, mode: Binning) -> None:
         )
     if raw.colour is not None:
         raise ValueError(f"camera.binning must be left out with noise.colour, got {mode.kind}")
+    if raw.excess:
+        raise ValueError(f"camera.binning must be left out with noise.excess, got {mode.kind}")
     if camera.get("line_time_us"):
         raise ValueError(f"camera.line_time_us must be 0 with camera.binning, got {given(camera['line_time_us'])}")
     white = camera.get("exposure", 0)

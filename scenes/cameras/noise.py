@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from scenes.cameras.colour import Colour
 from scenes.model import Model
-from scenes.ranges import Darkness, NotNegative, Spread, Trace
+from scenes.ranges import Bounded, Darkness, NotNegative, Spread, Trace
 
 
 class Noise(Model):
@@ -20,6 +22,9 @@ class Noise(Model):
     """Levels are rounded and clipped to 0 .. 2^bits - 1; left out: real numbers."""
     gain: NotNegative = 0.0
     """Makes shot noise of variance gain x (level - dark_level) [grey levels an electron]."""
+    excess: tuple[tuple[NotNegative, Bounded], ...] = ()
+    """Variance beside that, of a sensor that is not linear: rows of signal above darkness [grey levels] and variance
+    [grey levels^2], on straight lines between them, as at the last one beyond; `measure.photon_transfer` tells them."""
     row_sigma: Spread = 0.0
     """Beside ``sigma``: what all pixels of a row share in one picture, as read-out noise does [grey levels]."""
     column_sigma: Spread = 0.0
@@ -44,6 +49,19 @@ class Noise(Model):
             )
         return self
 
+    @model_validator(mode="after")
+    def _check_excess(self) -> Noise:
+        signals = [signal for signal, _ in self.excess]
+        if any(a >= b for a, b in pairwise(signals)) or (signals and signals[0] != 0):
+            raise ValueError(f"excess must be rows of rising signal from 0 on, got {signals}")
+        if self.excess and (self.colour is not None or not self.gain > 0):
+            other = "no colour filters" if self.colour is not None else f"gain {self.gain:g}"
+            raise ValueError(f"excess must stand beside a gain above 0 and without colour filters, got {other}")
+        for signal, excess in self.excess:
+            if self.sigma**2 + self.gain * signal + excess <= 0:
+                raise ValueError(f"excess must leave a variance above 0, got {excess:g} at signal {signal:g}")
+        return self
+
     @property
     def is_shared(self) -> bool:
         """Whether pixels of a row or of a column have noise in common."""
@@ -63,6 +81,25 @@ class Noise(Model):
     def shot_gain(self) -> float:
         """Variance that the light's own noise adds over the signal, of the same white noise [grey levels]."""
         return self.factor(1) * self.gain
+
+    def shot_variance(self, signal: np.ndarray) -> np.ndarray:
+        """Variance that the light's own noise adds at signals above darkness [grey levels], of the same white noise.
+
+        >>> Noise(sigma=1.0, gain=0.1, excess=[(0, 0), (10, 2)]).shot_variance(np.array([-1.0, 5.0, 20.0]))
+        array([0. , 1.5, 4. ])
+        """
+        signal = np.maximum(signal, 0.0)
+        straight = self.shot_gain * signal
+        return straight + np.interp(signal, *zip(*self.excess, strict=True)) if self.excess else straight
+
+    def shot_slope(self, signal: np.ndarray) -> np.ndarray:
+        """Its derivative by the signal."""
+        slope = np.where(np.asarray(signal) > 0, self.shot_gain, 0.0)
+        if not self.excess:
+            return slope
+        signals, excess = np.array(self.excess).T
+        bends = np.concatenate([[0.0], np.diff(excess) / np.diff(signals), [0.0]])
+        return slope + bends[np.searchsorted(signals, signal)]
 
     def factor(self, power: int) -> float:
         """`Colour.noise_factor`; 1 of a monochrome sensor."""

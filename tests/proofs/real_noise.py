@@ -2,11 +2,11 @@
 
 DIR holds reference sets of EMVA 1288 (github: EMVA1288/datasets; CC BY-SA, so not in this repository): frames of real
 cameras, evenly lit, in pairs of each exposure. Half of the steps tell the camera's noise by photon transfer
-(`measure.photon_transfer`). Differences of the other half's pairs over sqrt(2) are real noise of their levels, with its
-outliers, correlation and patterns that change from frame to frame: put onto noise-free renders, level by level, they
-take the place of the drawn noise, for every estimator and all measurands of three scenes. What rows and columns share
-has one value on both sides of an edge, so it is taken from the dark frames. Without DIR nothing is done, and the exit
-status is 0.
+(`measure.photon_transfer`; where variances do not lie on a line, with their excess). Differences of the other half's
+pairs over sqrt(2) are real noise of their levels, with its outliers, correlation and patterns that change from frame to
+frame: put onto noise-free renders, level by level, they take the place of the drawn noise, for every estimator and all
+measurands of three scenes. What rows and columns share has one value on both sides of an edge, so it is taken from the
+dark frames. Without DIR nothing is done, and the exit status is 0.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from imaging.features.measurand import measurands
 from imaging.pictures import Pictures
 from measure import ESTIMATORS, FramePair, PhotonTransfer, photon_transfer
 from scenes import Noise, Picture, Scene
+from scenes.status import is_trusted
 from tests import toleranced
 from tests.proofs.kinds import Row, summed_up, told
 from validation.remeasured import Method, batches
@@ -223,11 +224,12 @@ def real_noise(
     for folder in folders:
         pairs = read(folder)
         camera, real = pairs.halves
-        noise = camera.noise if rows else camera.noise.model_copy(update={"row_sigma": 0.0, "column_sigma": 0.0})
+        noise = camera.noise if is_trusted(camera.status) else camera.followed
+        noise = noise if rows else noise.model_copy(update={"row_sigma": 0.0, "column_sigma": 0.0})
         print(json.dumps({
             "set": folder.name, "photon transfer": camera.status, "bend": camera.bend,
             "package emva1288": by_package(folder),
-            "noise": camera.noise.model_dump(exclude_none=True), "bright": told_of(pairs.fields[real[-1]]),
+            "noise": noise.model_dump(exclude_none=True), "bright": told_of(pairs.fields[real[-1]]),
             "dark": told_of(pairs.dark_fields[real[0]]),
         }), flush=True)  # fmt: skip
         found: list[Row] = []

@@ -174,7 +174,8 @@ def _spoiled(judge: Judge) -> Iterator[Spoiled]:
     noise, dark = scene.noise, scene.noise.dark_level
     if noise.sigma > 0 or noise.gain > 0:
         louder = math.sqrt(factor)
-        more = noise.model_copy(update={"sigma": louder * noise.sigma, "gain": factor * noise.gain})
+        excess = tuple((signal, factor * each) for signal, each in noise.excess)
+        more = noise.model_copy(update={"sigma": louder * noise.sigma, "gain": factor * noise.gain, "excess": excess})
         name = "noise.sigma" + ", noise.gain" * (noise.gain > 0)
         yield name, f"{louder:.3g} times as noisy as the scene says", image, more
     told = f"{1 / factor:.3g} times the light that the scene says"

@@ -112,6 +112,10 @@ def check(picture: Picture, estimator: str) -> None:
     if scene.noise.colour is not None or scene.noise.is_shared:
         what = "colour" if scene.noise.colour is not None else "row_sigma or column_sigma"
         raise InvalidInput(f"noise must be of independent pixels for a recipe, got noise.{what}")
+    if scene.noise.excess:
+        raise InvalidInput(
+            f"noise must be a linear sensor's for a recipe, got noise.excess of {len(scene.noise.excess)} rows"
+        )
     kinds = {each.name: MEASURANDS[each.kind] for each in scene.quantities}
     for each in scene.quantities:
         if kinds[each.name].is_form or kinds[each.name].extreme:
