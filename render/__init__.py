@@ -8,7 +8,18 @@ from render.phenomena import EffectTolerance, choose, effects
 from render.phenomena.pose import shaken
 from render.quality import Quality
 from render.renderer import image
-from render.sensor import expose, variance
+from render.sensor import Exposer, expose, variance
 from render.series import shots
 
-__all__ = ["EffectTolerance", "Quality", "choose", "effects", "expose", "image", "shaken", "shots", "variance"]
+__all__ = [
+    "EffectTolerance",
+    "Exposer",
+    "Quality",
+    "choose",
+    "effects",
+    "expose",
+    "image",
+    "shaken",
+    "shots",
+    "variance",
+]

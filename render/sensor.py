@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.ndimage import binary_dilation
 
@@ -47,37 +49,79 @@ def expose(
     >>> pictures.shape, bool(abs(pictures.var() - (4 + 1 / 12)) < 0.2)
     ((1000, 4, 4), True)
     """
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise InvalidInput(f"count must be at least 1, got {count!r}")
     if not isinstance(noise, Noise) or not isinstance(rng, np.random.Generator):
         raise InvalidInput("noise and rng must be a Noise and a numpy Generator, got something else")
-    image = picture(image)
-    if where is not None and not (isinstance(where, np.ndarray) and where.shape == image.shape and where.dtype == bool):
-        raise InvalidInput(f"where must be an array of bool, shape {image.shape}, got something else")
-    if noise.colour is not None:
-        near = where if where is None or not noise.colour.interpolates else binary_dilation(where, np.ones((3, 3)))
-        mosaics = expose(raw(noise, np.asarray(image, float)), without_filters(noise), rng, count, near)
-        return picture_of(noise, mosaics)
-    key = rng.integers(2**64, size=2, dtype=np.uint64)
-    sigma = np.sqrt(noise.sigma**2 + shot_noise(noise, np.asarray(image, float) - noise.dark_level))
-    steady = np.asarray(image, float) + fixed_pattern(image, noise)
-    height, width = image.shape
-    pictures = np.empty((count, height, width))
-    pictures[:] = digitised(steady.copy(), noise)
-    rows, columns = _shared(noise, key, count, image.shape)
+    return Exposer(image, noise, where).take(rng, count)
+
+
+class Exposer:
+    """Takes pictures of one scene again and again: what they have in common is made once.
+
+    Parameters
+    ----------
+    image, noise, where
+        As of `expose`.
+    """
+
+    def __init__(self, image: np.ndarray, noise: Noise, where: np.ndarray | None = None) -> None:
+        image = picture(image)
+        if where is not None and not (
+            isinstance(where, np.ndarray) and where.shape == image.shape and where.dtype == bool
+        ):
+            raise InvalidInput(f"where must be an array of bool, shape {image.shape}, got something else")
+        self.noise, self._raw = noise, None
+        image = np.asarray(image, float)
+        if noise.colour is not None:
+            near = where if where is None or not noise.colour.interpolates else binary_dilation(where, np.ones((3, 3)))
+            self._raw = Exposer(raw(noise, image), without_filters(noise), near)
+            return
+        self._sigma = np.sqrt(noise.sigma**2 + shot_noise(noise, image - noise.dark_level))
+        self._steady = image + fixed_pattern(image, noise)
+        self._tiles = tuple(_tiles(image.shape, where))
+        self._taken = np.empty((0, *image.shape))
+
+    def take(self, rng: np.random.Generator, count: int, *, again: bool = False) -> np.ndarray:
+        """``count`` pictures, as `expose` gives them; ``again`` in the same memory, where the former ones are no longer
+        needed: only tiles with noise are written."""
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+            raise InvalidInput(f"count must be at least 1, got {count!r}")
+        if self._raw is not None:
+            return picture_of(self.noise, self._raw.take(rng, count, again=again))
+        pictures = self._room(count) if again else self._filled(count)
+        key = rng.integers(2**64, size=2, dtype=np.uint64)
+        rows, columns = _shared(self.noise, key, count, self._steady.shape)
+        for index, tile in self._tiles:
+            stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, index]))
+            block = stream.standard_normal((count, *self._steady[tile].shape))
+            block *= self._sigma[tile]
+            block += self._steady[tile]
+            if self.noise.is_shared:
+                block += rows[:, tile[0], None] + columns[:, None, tile[1]]
+            pictures[(slice(None), *tile)] = digitised(block, self.noise)
+        return pictures
+
+    def _room(self, count: int) -> np.ndarray:
+        """Of what was taken before, made when more are asked for than ever."""
+        if count > len(self._taken):
+            self._taken = self._filled(count)
+        return self._taken[:count]
+
+    def _filled(self, count: int) -> np.ndarray:
+        """Pictures without noise."""
+        pictures = np.empty((count, *self._steady.shape))
+        pictures[:] = digitised(self._steady.copy(), self.noise)
+        return pictures
+
+
+def _tiles(shape: tuple[int, int], where: np.ndarray | None) -> Iterator[tuple[int, tuple[slice, slice]]]:
+    """Numbers and places of the tiles in which a pixel is wanted."""
+    height, width = shape
     across = -(-width // TILE)
     for index in range(across * -(-height // TILE)):
         top, left = TILE * (index // across), TILE * (index % across)
         tile = np.s_[top : top + TILE, left : left + TILE]
         if where is None or where[tile].any():
-            stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, index]))
-            block = stream.standard_normal((count, *steady[tile].shape))
-            block *= sigma[tile]
-            block += steady[tile]
-            if noise.is_shared:
-                block += rows[:, tile[0], None] + columns[:, None, tile[1]]
-            pictures[(slice(None), *tile)] = digitised(block, noise)
-    return pictures
+            yield index, tile
 
 
 def _shared(noise: Noise, key: np.ndarray, count: int, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:

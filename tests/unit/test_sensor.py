@@ -119,3 +119,19 @@ def test_noise_is_drawn_by_tiles_of_16():
     expected = np.zeros((40, 50), bool)
     expected[:16, 16:32] = expected[16:32, 48:] = True
     assert ((found != 9.0) == expected).all()
+
+
+@pytest.mark.parametrize("said", [{}, {"gain": 0.1, "row_sigma": 0.5}, {"prnu": 0.01, "dsnu": 0.5}])
+def test_pictures_taken_again_are_those_of_new_memory(said):
+    """Fewer, as many and more than before; only what is wanted has noise."""
+    rng = np.random.default_rng(5)
+    image = rng.uniform(20, 200, (40, 50))
+    noise = Noise(sigma=2.0, bits=8, dark_level=10.0, **said)
+    where = np.zeros(image.shape, bool)
+    where[3:9, 20:40] = True
+    exposer = Exposer(image, noise, where)
+    for k, count in enumerate((3, 2, 3, 5)):
+        new = expose(image, noise, np.random.default_rng(k), count, where)
+        assert np.array_equal(exposer.take(np.random.default_rng(k), count, again=True), new)
+        assert np.array_equal(exposer.take(np.random.default_rng(k), count), new)
+    assert (new[:, 20:, :] == new[:1, 20:, :]).all()

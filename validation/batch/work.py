@@ -283,12 +283,17 @@ def measure_chunk(
     clock, picture = _Clock(), case.picture
     where = measure.region_of_interest(picture)
     clock.lap("prepare")
-    take = shots or (lambda rng, many: render.expose(image, case.scene.noise, rng, many, where))
-    counts = batches(count, max(1, min(_BATCH, _MOST_PIXELS // image.size)))
+    take = shots or functools.partial(render.Exposer(image, case.scene.noise, where).take, again=True)
+    counts = batches(count, batch_size(image))
     exposures = (take(_stream(seed, case.index, chunk, batch), many) for batch, many in enumerate(counts))
     found = remeasured(picture, exposures, methods(case.scene), clock.lap)
     values, statuses = _columns(case.scene, found)
     return Chunk(values, {name: _failures(values[name], statuses[name]) for name in values}, clock.seconds)
+
+
+def batch_size(image: np.ndarray) -> int:
+    """How many images of a size are exposed and measured at a time."""
+    return max(1, min(_BATCH, _MOST_PIXELS // image.size))
 
 
 def _stream(*place: int) -> np.random.Generator:
