@@ -81,8 +81,8 @@ class Chain:
         budget = self.budget
         first = np.array([source.kind == "brightness" or source.name in self._told for source in budget.sources], bool)
         placed = np.where(first, 0.0, errors)
-        found = [budget.features.errors(self.station(row)) for row in placed]
-        return believed(budget.picture, np.array(found)) + errors[:, first] @ budget.sensitivities[:, first].T
+        found = budget.features.errors([self.station(row) for row in placed])
+        return believed(budget.picture, found) + errors[:, first] @ budget.sensitivities[:, first].T
 
     @property
     def _told(self) -> tuple[str, ...]:
