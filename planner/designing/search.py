@@ -168,11 +168,11 @@ class _Search:
         if isinstance(seen, str):
             self.out[seen] += 1
             return None
-        least = min(floor(self.problem, each) for each in seen)
-        if self._is_hopeless(least, limit):
+        seen = tuple(each for each in seen if not self._is_hopeless(floor(self.problem, each), limit))
+        if not seen:
             self.out[PLACES] += number == 0
             return None
-        return self._rated(queue, at, seen, least > limit)
+        return self._rated(queue, at, seen, min(floor(self.problem, each) for each in seen) > limit)
 
     def _begin(self, queue: list[At], at: At, limit: float) -> None:
         """Ask what a pair promises; it comes back where that is enough."""
@@ -189,7 +189,7 @@ class _Search:
             heapq.heappush(queue, (cost, max(least, promise), pair, number))
 
     def _is_hopeless(self, ratio: float, limit: float) -> bool:
-        """Whether a pair of at least this ratio neither meets the limit nor may be the best of its cost."""
+        """Whether what has at least this ratio neither meets the limit nor may be the best of its cost."""
         record = min((each.ratio for each in self.offers), default=math.inf)
         return ratio > limit and ratio >= record * BETTER
 
