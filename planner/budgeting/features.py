@@ -25,7 +25,7 @@ from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
 from imaging.models.form_law import needed, residues
 from imaging.pictures import Pictures
-from planner.budgeting.station import Station
+from planner.budgeting.station import Station, records
 from scenes import Curved, Quantity
 from scenes.measurands.features import place_of
 from scenes.measurands.form import reference_of
@@ -95,17 +95,18 @@ class Features:
     def _circles(self, moved: list[np.ndarray]) -> list[np.ndarray]:
         """Shifts and growth of each circle, (S, 3) or (S, 4), of displacements (S, n, 2) of its points."""
         if not self.of_rims:
-            return [np.full((len(each), count), np.nan) for each, count in zip(moved, self.known.seen.sizes, strict=True)]
+            return [
+                np.full((len(each), count), np.nan) for each, count in zip(moved, self.known.seen.sizes, strict=True)
+            ]
         return [off @ fit.T for (_, _, fit), off in zip(self._rims, self._outwards(moved), strict=True)]
 
     @cached_property
     def _rims(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Of each circle its points in space (n, 3), their image's normals (n, 2), and the fit (p, n)."""
+        if not self.of_rims:
+            return [(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 0)))] * len(self.known.circles)
         found = []
         for name in self.known.circles:
-            if not self.of_rims:
-                found.append((np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 0))))
-                continue
             circle = self.pictures.scene.solid.round(name)
             if isinstance(circle, Curved):
                 found.append(self._limb(circle))
@@ -139,6 +140,8 @@ class Features:
     def _form(self, on_edges: np.ndarray, on_rims: list[np.ndarray], quantity: Quantity) -> float:
         """Of points that a perfect feature has elsewhere: their zone, which is as large to either side of an input."""
         name = place_of(quantity.features[0])
+        if name in self.known.circles and not self.of_rims:
+            return np.nan
         if name in self.known.circles:
             off, design = self._beside_rim(on_rims, self.known.circles.index(name))
         else:
@@ -196,8 +199,7 @@ class Features:
     def _displaced(self, stations: Sequence[Station]) -> list[np.ndarray]:
         """How far off the points are found, ideal px of the believed camera, (S, ..., 2) for each of `_points`."""
         flat, believed = self._believed
-        found = np.stack([each.record(flat) for each in stations])
-        off = undistorted(found, self.pictures.scene.camera) - believed
+        off = undistorted(records(stations, flat), self.pictures.scene.camera) - believed
         sizes = np.cumsum([each.size // 3 for each in self._points])[:-1]
         parts = np.split(off, sizes, axis=1)
         return [some.reshape(len(stations), *at.shape[:-1], 2) for some, at in zip(parts, self._points, strict=True)]

@@ -44,9 +44,9 @@ class Ahead:
         return self.sensors[i], self.lenses[j]
 
     def promised(self, pair: int, queue: list[At]) -> float | str:
-        """U over what is allowed that no light makes less, by straight edges alone; or what keeps a pair from measuring.
+        """U over what is allowed that no light makes less, by straight edges alone; or what keeps a pair from it.
 
-        Of the next ones in the queue it is found with it.
+        That of the next pairs in the queue is found with it.
         """
         if pair not in self._promised:
             ahead = [pair, *(each[2] for each in heapq.nsmallest(_TOGETHER, queue))]

@@ -107,7 +107,7 @@ class _Search:
         return self._told(winner, complete)
 
     def _queue(self) -> list[At]:
-        """Pairs by cost with the cheapest light, then by what they promise: their least ratio by noise alone at first."""
+        """Pairs by cost with the cheapest light, then by what they promise: at first the least ratio by noise."""
         self.report("bounds", 0, 1)
         found = pairs(self.problem, self.sensors, self.lenses)
         for k, name in enumerate(REASONS):
@@ -157,7 +157,7 @@ class _Search:
 
         A pair that promises enough comes back in its place among those of equal cost, a rated one with its next light.
         """
-        at = cost, promise, pair, number = heapq.heappop(queue)
+        at = _, promise, pair, number = heapq.heappop(queue)
         if pair not in self.begun:
             self._begin(queue, at, limit)
             return None
@@ -216,7 +216,7 @@ class _Search:
                 heapq.heappush(queue, (more, promise, pair, number + 1))
 
     def _met(self, offer: Offer, queue: list[At]) -> Offer | None:
-        """An offer, where it meets all when it is looked at closely; its pair's next lights may do where it does not."""
+        """An offer that meets all when it is looked at closely; else its pair comes back with its next light."""
         close, pair = self._look(offer), offer.order[0]
         if close is not None and close.ratio <= 1:
             return close
