@@ -140,10 +140,11 @@ class _Search:
             if best is None and done:
                 return None
             if best is not None and (done or best.preference[:2] < (queue[0][0], to_three(queue[0][1]))):
-                passing.remove(best)  # nothing that is left may be preferred
+                if best.close is not None:  # nothing that is left may be preferred
+                    return best
+                passing.remove(best)
                 close = self._met(best, queue)
-                if close is not None:
-                    return close
+                passing += [] if close is None else [close]  # its ratio may be another
                 continue
             offer = self._next(queue, 1.0)
             if offer is not None and offer.ratio <= 1:

@@ -146,7 +146,7 @@ def test_variance_by_inputs_that_move_places(monkeypatch):
     scene = SimpleNamespace(quantities=(1, 2), uncertainty=SimpleNamespace(covariance=told), free=(0,))
     monkeypatch.setattr(plans.Pictures, "of", lambda *_: None)
     known = SimpleNamespace(known=SimpleNamespace(quantities=scene.quantities))
-    monkeypatch.setattr(plans, "Features", lambda pictures: known)
+    monkeypatch.setattr(plans, "Features", lambda pictures, of_rims: known)
     monkeypatch.setattr(plans, "sensitivities", lambda features, still, biased: slopes[:, : len(still)])
     a, b, c = (slopes * [0.3, 0.5, 2.0]).T
     expected = a**2 + b**2 + c**2 - 1.2 * a * b
