@@ -26,12 +26,11 @@ def products(features: Features, given: tuple[Source, ...]) -> np.ndarray:
     nothing; the scene's unit or degrees. Inputs of a calibration count as uncorrelated.
     """
     angle = next((each for each in given if each.name == ANGLE), None)
-    total = np.zeros(len(features.known.quantities))
     if angle is None or angle.told.u == 0:
-        return total
+        return np.zeros(len(features.known.quantities))
     others = [each for each in given if each.kind == "geometry" and each is not angle and each.told.u > 0]
-    mixed = _mixed(features, angle, others)
-    return np.sqrt(((mixed * np.array([[each.told.u] for each in others])) ** 2).sum(0))
+    u = np.array([each.told.u for each in others])
+    return np.sqrt(((_mixed(features, angle, others) * u[:, None]) ** 2).sum(0))
 
 
 def _mixed(features: Features, angle: Source, others: Sequence[Source]) -> np.ndarray:
