@@ -374,7 +374,7 @@ def test_a_limit_of_unknown_sign_and_a_height_act_together(plate):
 def test_a_limit_of_unknown_sign_alone_has_no_product(plate):
     """Where nothing else of the picture is uncertain, and where the angle is not."""
     for camera, count in (({"telecentricity_deg": {"value": 0.0, "half_width": 0.1}}, 1), ({}, 0)):
-        scene = plate.with_(camera=camera, uncertainty={})
+        scene = plate.with_(camera=camera, uncertainty={"part_shift": None})
         given = sources(scene)
         assert len(given) == count
         assert products(Features(Pictures.of(Picture.of(scene, (0, 90)))), given).tolist() == [0.0]
