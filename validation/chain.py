@@ -30,7 +30,7 @@ from validation.stations import exposed
 if TYPE_CHECKING:
     from validation.remeasured import MeasuredValues
 
-_AT_ONCE = 64  # pictures in memory
+_AT_ONCE = 64  # pictures, or stations, in memory
 _IN_A_PICTURE = (NOISE, PATTERN, MODEL, ROUNDING)
 
 
@@ -81,8 +81,9 @@ class Chain:
         budget = self.budget
         first = np.array([source.kind == "brightness" or source.name in self._told for source in budget.sources], bool)
         placed = np.where(first, 0.0, errors)
-        found = [budget.features.errors(self.station(row)) for row in placed]
-        return believed(budget.picture, np.array(found)) + errors[:, first] @ budget.sensitivities[:, first].T
+        some = (placed[k : k + _AT_ONCE] for k in range(0, len(placed), _AT_ONCE))
+        found = np.concatenate([budget.features.errors([self.station(row) for row in rows]) for rows in some])
+        return believed(budget.picture, found) + errors[:, first] @ budget.sensitivities[:, first].T
 
     @property
     def _told(self) -> tuple[str, ...]:

@@ -106,9 +106,10 @@ def seen_coarsely(pictures: Pictures, shrink: int, smooth: float) -> Pictures:
     if shrink == 1 and not smooth:
         return pictures
     scene, camera = pictures.scene, pictures.scene.camera
+    blur, field = camera.blur_px / shrink, camera.blur_field
     fewer = {
         "width": camera.width // shrink, "height": camera.height // shrink, "focal_px": camera.focal_px / shrink,
-        "blur_px": float(np.hypot(camera.blur_px / shrink, smooth)),
+        "blur_px": float(np.hypot(blur, smooth)), "blur_field": field and field.smoothed(blur, smooth),
     }  # fmt: skip
     return pictures.with_scene(scene.tried(camera=camera.tried(**fewer)))
 

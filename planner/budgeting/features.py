@@ -7,6 +7,7 @@ along the part of an edge that is used, weighted by contrast around a rim.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,7 +25,7 @@ from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
 from imaging.models.form_law import needed, residues
 from imaging.pictures import Pictures
-from planner.budgeting.station import Station
+from planner.budgeting.station import Station, records
 from scenes import Curved, Quantity
 from scenes.measurands.features import place_of
 from scenes.measurands.form import reference_of
@@ -38,9 +39,12 @@ class Features:
     ----------
     pictures : Pictures
         One picture.
+    of_rims : bool
+        Whether circles are found. They cost most of the time; without them what depends on them is NaN.
     """
 
     pictures: Pictures
+    of_rims: bool = True
 
     @cached_property
     def known(self) -> Measurands:
@@ -54,19 +58,17 @@ class Features:
             return self.known.gradient_object
         return variance_model(DEFAULT_MODEL)(self.pictures).gradient_object
 
-    def errors(self, station: Station) -> np.ndarray:
-        """Errors of lines and circles, as numbered in `imaging.features.seen`, shape (q,).
+    def errors(self, stations: Sequence[Station]) -> np.ndarray:
+        """Errors of lines and circles in the pictures of S stations, as numbered in `imaging.features.seen`, (S, q).
 
         Displacement of each line at its first end's place (ideal px) and tangent of its rotation; shifts of each
         circle's centre in its plane and change of its radius (the scene's unit); the zones of forms, with the sign of
         the farthest point's side (the scene's unit); a board's own parameters. NaN where a feature is not seen.
         """
-        on_edges, *on_rims = self._displaced(station)
-        parts = [self._lines(on_edges).ravel()]
-        parts += [fit @ off for (_, _, fit), off in zip(self._rims, self._outwards(on_rims), strict=True)]
-        parts.append(np.array([self._form(on_edges, on_rims, quantity) for quantity in self.known.seen.forms]))
-        parts.append(self._board(station))
-        return np.concatenate(parts)
+        on_edges, *on_rims = self._displaced(stations)
+        parts = [self._lines(on_edges), *self._circles(on_rims)]
+        parts += [self._forms(on_edges, on_rims), np.stack([self._board(each) for each in stations])]
+        return np.concatenate(parts, -1)
 
     @cached_property
     def _nodes(self) -> tuple[EdgeNodes, np.ndarray]:
@@ -77,22 +79,32 @@ class Features:
         return nodes, edge_points(solid, view.names, nodes.spatial[..., 1:-1])
 
     def _lines(self, moved: np.ndarray) -> np.ndarray:
-        """(d, tan theta) of each edge, shape (E, 2): of the line through its points, displaced by (E, n, 2)."""
+        """(d, tan theta) of each edge, (..., 2 E): of the line through its points, displaced by (..., E, n, 2)."""
         view = self.known.view
         if not view.names:
-            return np.zeros((0, 2))
+            return np.zeros((len(moved), 0))
         (nodes, _), normal = self._nodes, normals(view)
-        off = np.einsum("eni,ei->en", moved, normal)
+        off = np.einsum("...eni,ei->...en", moved, normal)
         tangent = np.stack([normal[:, 1], -normal[:, 0]], -1)
-        along = nodes.middle + nodes.t[..., 1:-1] + np.einsum("eni,ei->en", moved, tangent)
+        along = nodes.middle + nodes.t[..., 1:-1] + np.einsum("...eni,ei->...en", moved, tangent)
         middle, mean = (part @ NODE_WEIGHTS / 2 for part in (along, off))
-        lever = along - middle[:, None]
+        lever = along - middle[..., None]
         turn = ((off * lever) @ NODE_WEIGHTS) / (lever**2 @ NODE_WEIGHTS)
-        return np.stack([mean - turn * middle, turn], -1)
+        return np.stack([mean - turn * middle, turn], -1).reshape(len(moved), -1)
+
+    def _circles(self, moved: list[np.ndarray]) -> list[np.ndarray]:
+        """Shifts and growth of each circle, (S, 3) or (S, 4), of displacements (S, n, 2) of its points."""
+        if not self.of_rims:
+            return [
+                np.full((len(each), count), np.nan) for each, count in zip(moved, self.known.seen.sizes, strict=True)
+            ]
+        return [off @ fit.T for (_, _, fit), off in zip(self._rims, self._outwards(moved), strict=True)]
 
     @cached_property
     def _rims(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Of each circle its points in space (n, 3), their image's normals (n, 2), and the fit (p, n)."""
+        if not self.of_rims:
+            return [(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 0)))] * len(self.known.circles)
         found = []
         for name in self.known.circles:
             circle = self.pictures.scene.solid.round(name)
@@ -113,12 +125,23 @@ class Features:
         return points, np.nan_to_num(outline.outward), _fit(limb_rim(self.pictures, curved))
 
     def _outwards(self, on_rims: list[np.ndarray]) -> list[np.ndarray]:
-        """Along the normals of each circle's image, (n,), displacements (n, 2)."""
-        return [np.einsum("ni,ni->n", moved, each[1]) for moved, each in zip(on_rims, self._rims, strict=True)]
+        """Along the normals of each circle's image, (..., n), displacements (..., n, 2)."""
+        return [np.einsum("...ni,ni->...n", moved, each[1]) for moved, each in zip(on_rims, self._rims, strict=True)]
+
+    def _forms(self, on_edges: np.ndarray, on_rims: list[np.ndarray]) -> np.ndarray:
+        """Zones of forms, (S, F)."""
+        quantities = self.known.seen.forms
+        found = [
+            [self._form(on_edges[s], [each[s] for each in on_rims], quantity) for quantity in quantities]
+            for s in range(len(on_edges))
+        ]
+        return np.reshape(found, (len(on_edges), len(quantities)))
 
     def _form(self, on_edges: np.ndarray, on_rims: list[np.ndarray], quantity: Quantity) -> float:
         """Of points that a perfect feature has elsewhere: their zone, which is as large to either side of an input."""
         name = place_of(quantity.features[0])
+        if name in self.known.circles and not self.of_rims:
+            return np.nan
         if name in self.known.circles:
             off, design = self._beside_rim(on_rims, self.known.circles.index(name))
         else:
@@ -173,12 +196,13 @@ class Features:
         flat = np.concatenate([each.reshape(-1, 3) for each in self._points])
         return flat, project_ideal(flat, self.pictures.sensors, self.pictures.scene.camera)
 
-    def _displaced(self, station: Station) -> list[np.ndarray]:
-        """How far off the points are found, ideal px of the believed camera, (..., 2) for each of `_points`."""
+    def _displaced(self, stations: Sequence[Station]) -> list[np.ndarray]:
+        """How far off the points are found, ideal px of the believed camera, (S, ..., 2) for each of `_points`."""
         flat, believed = self._believed
-        off = undistorted(station.record(flat), self.pictures.scene.camera) - believed
+        off = undistorted(records(stations, flat), self.pictures.scene.camera) - believed
         sizes = np.cumsum([each.size // 3 for each in self._points])[:-1]
-        return [some.reshape(*at.shape[:-1], 2) for some, at in zip(np.split(off, sizes), self._points, strict=True)]
+        parts = np.split(off, sizes, axis=1)
+        return [some.reshape(len(stations), *at.shape[:-1], 2) for some, at in zip(parts, self._points, strict=True)]
 
 
 def _fit(seen: RimImage) -> np.ndarray:

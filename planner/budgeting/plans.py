@@ -120,10 +120,13 @@ def plan_capability(
     return CapabilityPlan(*found, pairs=len(grid.sensors) * len(grid.lights))
 
 
-def systematic(scene: Scene, sensor: np.ndarray, given: tuple[Source, ...], *, closely: bool = True) -> np.ndarray:
+def systematic(
+    scene: Scene, sensor: np.ndarray, given: tuple[Source, ...], *, closely: bool = True, of_rims: bool = True
+) -> np.ndarray:
     """Variance of each quantity by the inputs that move places in the image, at a sensor's pose (2,), shape (M,).
 
-    Not ``closely``: rims count as they do in a search, which is 25 times faster and differs by a few per cent.
+    Not ``closely``: rims count as they do in a search, which is 25 times faster and differs by a few per cent. Without
+    rims what depends on circles is NaN.
     """
     still = tuple(each for each in given if each.kind == "geometry")
     count = len(scene.quantities)
@@ -131,7 +134,7 @@ def systematic(scene: Scene, sensor: np.ndarray, given: tuple[Source, ...], *, c
         return np.zeros(count)
     pictures = Pictures.of(scene, sensor, _anywhere(scene))
     with np.errstate(all="ignore"):
-        features = Features(pictures if closely else pictures.glanced)
+        features = Features(pictures if closely else pictures.glanced, of_rims)
         slopes = sensitivities(features, still, biased=False)
         u = np.array([each.told.u for each in still])
         spread = slopes * u

@@ -7,10 +7,12 @@ other input that moves places in the image.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from planner.budgeting.features import Features
-from planner.budgeting.sensitivities import STEP, pulled
+from planner.budgeting.sensitivities import by_geometry
 from planner.budgeting.sources import Source
 from planner.budgeting.station import Station
 
@@ -24,21 +26,15 @@ def products(features: Features, given: tuple[Source, ...]) -> np.ndarray:
     nothing; the scene's unit or degrees. Inputs of a calibration count as uncorrelated.
     """
     angle = next((each for each in given if each.name == ANGLE), None)
-    total = np.zeros(len(features.known.quantities))
     if angle is None or angle.told.u == 0:
-        return total
+        return np.zeros(len(features.known.quantities))
+    others = [each for each in given if each.kind == "geometry" and each is not angle and each.told.u > 0]
+    u = np.array([each.told.u for each in others])
+    return np.sqrt(((_mixed(features, angle, others) * u[:, None]) ** 2).sum(0))
+
+
+def _mixed(features: Features, angle: Source, others: Sequence[Source]) -> np.ndarray:
+    """Change of the values' derivatives by n inputs over the angle's standard uncertainty, shape (n, M)."""
     here = Station.nominal(features.pictures)
-    for other in given:
-        if other.kind == "geometry" and other is not angle and other.told.u > 0:
-            total += (_mixed(features, here, angle, other) * other.told.u) ** 2
-    return np.sqrt(total)
-
-
-def _mixed(features: Features, here: Station, angle: Source, other: Source) -> np.ndarray:
-    """Change of the values' derivative by an input over the angle's standard uncertainty, shape (M,)."""
-    step, slopes = STEP * other.scale, []
-    for sign in (1, -1):
-        turned = angle.moved(here, sign * angle.told.u)
-        ahead, behind = (features.errors(other.moved(turned, way * step)) for way in (1, -1))
-        slopes.append((ahead - behind) / (2 * step))
-    return pulled(features.gradient_object, slopes[0] - slopes[1]) / 2
+    more, less = (by_geometry(features, angle.moved(here, sign * angle.told.u), others) for sign in (1, -1))
+    return (more - less) / 2

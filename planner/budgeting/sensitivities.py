@@ -9,6 +9,8 @@ uncertainty to both sides. What a geometric input does to that bias, a small par
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from imaging.models import DEFAULT_MODEL, variance_model
@@ -37,14 +39,10 @@ def sensitivities(features: Features, given: tuple[Source, ...], *, biased: bool
     """
     here = Station.nominal(features.pictures)
     count, left = len(features.known.quantities), _by_placement(features)
+    moving = tuple(each for each in given if each.kind == "geometry" and each.name not in left)
+    left |= {each.name: slope for each, slope in zip(moving, by_geometry(features, here, moving), strict=True)}
     columns = [
-        left[each.name]
-        if each.name in left
-        else _by_geometry(features, here, each)
-        if each.kind == "geometry"
-        else _by_brightness(here, each)
-        if biased
-        else np.zeros(count)
+        left[each.name] if each.name in left else _by_brightness(here, each) if biased else np.zeros(count)
         for each in given
     ]
     return np.stack(columns, -1) if columns else np.zeros((count, 0))
@@ -64,15 +62,19 @@ def _by_placement(features: Features) -> dict[str, np.ndarray]:
     return dict(zip(adjustment.placing.names, left.T, strict=True))
 
 
-def _by_geometry(features: Features, here: Station, source: Source) -> np.ndarray:
-    step = STEP * source.scale
-    ahead, behind = (features.errors(source.moved(here, sign * step)) for sign in (1, -1))
-    return pulled(features.gradient_object, (ahead - behind) / (2 * step))
+def by_geometry(features: Features, here: Station, given: Sequence[Source]) -> np.ndarray:
+    """Derivatives of all M values by n inputs that move places in the image, of a picture of a station, (n, M)."""
+    if not given:
+        return np.zeros((0, len(features.known.quantities)))
+    steps = STEP * np.array([each.scale for each in given])
+    moved = [each.moved(here, sign * step) for sign in (1, -1) for each, step in zip(given, steps, strict=True)]
+    ahead, behind = np.split(features.errors(moved), 2)
+    return pulled(features.gradient_object, (ahead - behind) / (2 * steps[:, None]))
 
 
 def pulled(gradient: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """gradient (M, q) . errors (q,), where only what a quantity depends on has to be known, shape (M,)."""
-    return np.where(gradient == 0, 0.0, gradient * np.where(gradient == 0, 0.0, errors)).sum(-1)
+    """gradient (M, q) . errors (n, q), where only what a quantity depends on has to be known, shape (n, M)."""
+    return np.where(gradient == 0, 0.0, gradient * np.where(gradient == 0, 0.0, errors[:, None])).sum(-1)
 
 
 def _by_brightness(here: Station, source: Source) -> np.ndarray:

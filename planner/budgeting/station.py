@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,21 +96,35 @@ class Station:
             at = Rotation.from_rotvec(vector).apply((at - pivot).reshape(-1, 3)).reshape(at.shape) + pivot
         return at + np.array(shift)
 
-    def ideal(self, points: np.ndarray) -> np.ndarray:
-        """Where a pinhole at the true pose sees points (n, 3) of the part, px, shape (n, 2)."""
-        camera = self.scene.camera
-        centre = image_centre(camera)
-        cos, sin = np.cos(np.radians(self.roll_deg)), np.sin(np.radians(self.roll_deg))
-        return (project_ideal(self.part_at(points), self.sensor, camera) - centre) @ np.array(
-            [[cos, -sin], [sin, cos]]
-        ) + centre
-
     def record(self, points: np.ndarray) -> np.ndarray:
         """Where the camera records points (n, 3) of the part, px, shape (n, 2)."""
-        camera = self.scene.camera
-        centre = image_centre(camera)
-        seen = recorded(self.ideal(points), camera) - centre
-        return centre + np.array(self.principal_px) + seen * np.array(self.stretch)
+        return records([self], points)[0]
+
+
+def records(stations: Sequence[Station], points: np.ndarray) -> np.ndarray:
+    """Where the cameras of S stations record points (n, 3) of the part, px, shape (S, n, 2).
+
+    Stations of one scene, which differ in where things stand, are evaluated together.
+    """
+    found = np.empty((len(stations), len(points), 2))
+    numbers: dict[int, list[int]] = defaultdict(list)
+    for k, each in enumerate(stations):
+        numbers[id(each.scene)].append(k)
+    for some in numbers.values():
+        found[some] = _recorded([stations[k] for k in some], points)
+    return found
+
+
+def _recorded(stations: Sequence[Station], points: np.ndarray) -> np.ndarray:
+    """The same where the scene is one."""
+    camera = stations[0].scene.camera
+    centre, roll = image_centre(camera), np.radians([each.roll_deg for each in stations])
+    cos, sin = np.cos(roll), np.sin(roll)
+    turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
+    there, sensors = np.stack([each.part_at(points) for each in stations]), np.stack([each.sensor for each in stations])
+    ideal = (project_ideal(there, sensors, camera) - centre) @ turn + centre
+    stretch, middle = (np.array([getattr(each, name) for each in stations]) for name in ("stretch", "principal_px"))
+    return centre + middle[:, None] + (recorded(ideal, camera) - centre) * stretch[:, None]
 
 
 def _moved(pose: np.ndarray, step_deg: float, which: int) -> np.ndarray:

@@ -8,16 +8,16 @@ from functools import partial
 from typing import Any
 
 from planner.designing.close import Close, look
-from planner.designing.evaluation import Problem, Rated, Viewed, rate_light, views
+from planner.designing.evaluation import Problem, Rated, Viewed, floor, rate_light, views
 from scenes.catalogue import ListedLens, ListedLight, ListedSensor
 
-_TOGETHER, _LIGHTS_TOGETHER = 16, 8  # pairs whose views are found at a time, and lights that a pair is rated with
+_TOGETHER, _LIGHTS_TOGETHER = 16, 4  # pairs that are promised at a time, and lights that a pair is rated with
 Parts = tuple[ListedSensor, ListedLens]
-At = tuple[float, float, int, int]  # cost, least ratio, pair, number of the light
+At = tuple[float, float, int, int]  # cost, what its pair promises, pair, number of the light
 
 
 class Ahead:
-    """Views and ratings, each found once.
+    """Promises, views and ratings, each found once.
 
     Parameters
     ----------
@@ -34,6 +34,7 @@ class Ahead:
     ) -> None:  # fmt: skip
         self.problem, self.mapped = problem, mapped
         self.sensors, self.lenses, self.lights = sensors, lenses, lights
+        self._promised: dict[int, float | str] = {}
         self._seen: dict[int, tuple[Viewed, ...] | str] = {}
         self._rated: dict[tuple[int, int], Rated | str] = {}
 
@@ -42,13 +43,22 @@ class Ahead:
         i, j = divmod(pair, len(self.lenses))
         return self.sensors[i], self.lenses[j]
 
-    def views(self, pair: int, queue: list[At]) -> tuple[Viewed, ...] | str:
-        """Of a pair; those of the next ones in the queue are found with it."""
-        if pair not in self._seen:
+    def promised(self, pair: int, queue: list[At]) -> float | str:
+        """U over what is allowed that no light makes less, by straight edges alone; or what keeps a pair from it.
+
+        That of the next pairs in the queue is found with it.
+        """
+        if pair not in self._promised:
             ahead = [pair, *(each[2] for each in heapq.nsmallest(_TOGETHER, queue))]
-            wanted = [each for each in dict.fromkeys(ahead) if each not in self._seen][:_TOGETHER]
-            made = self.mapped(partial(_viewed, self.problem), [self.parts(each) for each in wanted])
-            self._seen |= dict(zip(wanted, made, strict=True))
+            wanted = [each for each in dict.fromkeys(ahead) if each not in self._promised][:_TOGETHER]
+            made = self.mapped(partial(_promised, self.problem), [self.parts(each) for each in wanted])
+            self._promised |= dict(zip(wanted, made, strict=True))
+        return self._promised[pair]
+
+    def views(self, pair: int) -> tuple[Viewed, ...] | str:
+        """Of a pair."""
+        if pair not in self._seen:
+            self._seen[pair] = views(self.problem, *self.parts(pair))
         return self._seen[pair]
 
     def rated(self, pair: int, number: int, seen: tuple[Viewed, ...]) -> Rated | str:
@@ -64,8 +74,9 @@ class Ahead:
         return list(self.mapped(partial(look, self.problem), rated))
 
 
-def _viewed(problem: Problem, parts: Parts) -> tuple[Viewed, ...] | str:
-    return views(problem, *parts)
+def _promised(problem: Problem, parts: Parts) -> float | str:
+    seen = views(problem, *parts, of_rims=False)
+    return seen if isinstance(seen, str) else min(floor(problem, each) for each in seen)
 
 
 def _rated(problem: Problem, parts: Parts, seen: tuple[Viewed, ...], light: ListedLight) -> Rated | str:

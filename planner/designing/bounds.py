@@ -98,13 +98,12 @@ def _seen(
 
 def _least_blur(problem: Problem, aspect: Aspect, lenses: Sequence[ListedLens], scale: np.ndarray) -> np.ndarray:
     """Least blur of the apertures of each lens, um, (S, L); an MTF counts as no more than diffraction."""
-    found = np.full(scale.shape, np.inf)
-    longest = max(len(each.stops) for each in lenses)
-    for k in range(longest):
-        stops = np.array([each.stops[min(k, len(each.stops) - 1)] for each in lenses])
-        tele = np.array([each.is_telecentric for each in lenses])
+    found, apertures = np.full(scale.shape, np.inf), [each.stops for each in lenses]
+    tele = np.array([each.is_telecentric for each in lenses])
+    own = np.array([0.0 if each.mtf else problem.otherwise_um for each in lenses])
+    for k in range(max(map(len, apertures))):
+        stops = np.array([each[min(k, len(each) - 1)] for each in apertures])
         number = np.where(tele, stops, stops * (1 + scale))
-        own = np.array([0.0 if each.mtf else problem.otherwise_um for each in lenses])
         defocus = defocus_um(scale, aspect.half_depth_mm, number)
         found = np.minimum(found, np.sqrt(airy_um(_SHORTEST_NM, 1.0) ** 2 * number**2 + own**2 + defocus**2))
     return found

@@ -133,8 +133,14 @@ class Rated:
         return self.settings.sensor.name, self.settings.lens.name, self.settings.light.name
 
 
-def views(problem: Problem, sensor: ListedSensor, lens: ListedLens) -> tuple[Viewed, ...] | str:
-    """From where a pair sees all that is measured, the least unsure place first; or what keeps it from that."""
+def views(
+    problem: Problem, sensor: ListedSensor, lens: ListedLens, *, of_rims: bool = True
+) -> tuple[Viewed, ...] | str:
+    """From where a pair sees all that is measured, the least unsure place first; or what keeps it from that.
+
+    Without rims what is unsure is that of straight edges alone, half as dear: 0 of what depends on circles, and so a
+    lower bound.
+    """
     found, why = [], []
     for aspect in _nearest_turns(problem, sensor, lens):
         at = focused(sensor, lens, aspect, problem.wishes)
@@ -146,8 +152,8 @@ def views(problem: Problem, sensor: ListedSensor, lens: ListedLens) -> tuple[Vie
             why.append(settings)
             continue
         scene = station(problem.scene, settings)
-        moved = systematic(scene, np.array(list(aspect.pose)), sources(scene), closely=False)
-        found.append(Viewed(aspect, at, np.where(np.isfinite(moved), moved, np.inf)))
+        moved = systematic(scene, np.array(list(aspect.pose)), sources(scene), closely=False, of_rims=of_rims)
+        found.append(Viewed(aspect, at, np.where(np.isfinite(moved), moved, np.inf if of_rims else 0.0)))
     if not found:
         return why[-1]
     return tuple(sorted(found, key=lambda each: floor(problem, each)))

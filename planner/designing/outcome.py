@@ -47,7 +47,7 @@ class Offer:
     @property
     def preference(self) -> tuple[float, float, tuple[int, int]]:
         """By cost, then by the ratio to three digits, then as the catalogue has them."""
-        return self.cost, float(f"{self.ratio:.3g}"), self.order
+        return self.cost, to_three(self.ratio), self.order
 
     @property
     def shape(self) -> tuple:
@@ -127,6 +127,11 @@ class Design:
     def scene(self) -> Scene:
         """The station that was found."""
         return station(self.problem.scene, self.best.rated.settings)
+
+
+def to_three(ratio: float) -> float:
+    """Rounded to three digits: what is less than that apart is equal."""
+    return float(f"{ratio:.3g}")
 
 
 def front_of(offers: Iterable[Offer]) -> Iterator[Offer]:

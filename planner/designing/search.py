@@ -22,7 +22,7 @@ from planner.designing.ahead import Ahead, At
 from planner.designing.bounds import REASONS, pairs
 from planner.designing.close import Close, look
 from planner.designing.evaluation import OWN_LIGHT, Problem, Viewed, floor
-from planner.designing.outcome import BETTER, Design, Offer, Tally, front_of
+from planner.designing.outcome import BETTER, Design, Offer, Tally, front_of, to_three
 from planner.designing.usable import worthwhile
 from scenes import InvalidInput
 from scenes.catalogue import Catalogue
@@ -91,6 +91,8 @@ class _Search:
         self.sensors, self.lenses = kept["sensors"], kept["lenses"]
         self.lights = sorted(kept["lights"], key=lambda each: each.price or 0.0)
         self.ahead = Ahead(problem, self.sensors, self.lenses, self.lights, mapped)
+        self.begun: set[int] = set()  # pairs of which it is known what they promise
+        self.least: dict[int, float] = {}  # ratio of a pair by noise alone, which none of its stations has less than
         self.offers: list[Offer] = []
         self.hard: dict[tuple, float] = {}  # of a light's shape: least factor of noise over the bound of its pair
         self.contradicted: Counter = Counter()  # by pair: how many lights close looks have contradicted
@@ -105,7 +107,7 @@ class _Search:
         return self._told(winner, complete)
 
     def _queue(self) -> list[At]:
-        """Pairs by cost with the cheapest light: (cost, least ratio, pair, number of the light)."""
+        """Pairs by cost with the cheapest light, then by what they promise: at first the least ratio by noise."""
         self.report("bounds", 0, 1)
         found = pairs(self.problem, self.sensors, self.lenses)
         for k, name in enumerate(REASONS):
@@ -115,11 +117,9 @@ class _Search:
         budget_limit = self.problem.wishes.budget or math.inf
         self.out[BUDGET] += int((costs > budget_limit).sum())
         least = found.least.ravel()[possible]
-        queue = [
-            (float(cost), float(bound), int(pair), 0)
-            for cost, bound, pair in zip(costs, least, possible, strict=True)
-            if cost <= budget_limit
-        ]
+        self.least = dict(zip(possible.tolist(), least.tolist(), strict=True))
+        queue = [(cost, self.least[pair], pair, 0) for cost, pair in zip(costs.tolist(), self.least, strict=True)
+                 if cost <= budget_limit]  # fmt: skip
         heapq.heapify(queue)
         return queue
 
@@ -136,43 +136,69 @@ class _Search:
         """The cheapest station that meets all, looked at closely; of equal cost that of the least ratio."""
         passing: list[Offer] = []
         while True:
-            if passing and (not queue or queue[0][0] > passing[0].cost):
-                found = self._closest(passing, queue)
-                if found:
-                    return found
-                passing = []
-            if not queue or self.counts["views"] >= self.most:
-                return self._closest(passing, queue)
+            best, done = min(passing, key=lambda each: each.preference, default=None), self._is_done(queue)
+            if best is None and done:
+                return None
+            if best is not None and (done or best.preference[:2] < (queue[0][0], to_three(queue[0][1]))):
+                if best.close is not None:  # nothing that is left may be preferred
+                    return best
+                passing.remove(best)
+                close = self._met(best, queue)
+                passing += [] if close is None else [close]  # its ratio may be another
+                continue
             offer = self._next(queue, 1.0)
             if offer is not None and offer.ratio <= 1:
                 passing.append(offer)
 
+    def _is_done(self, queue: list[At]) -> bool:
+        return not queue or self.counts["views"] >= self.most
+
     def _next(self, queue: list[At], limit: float) -> Offer | None:
-        """Rate the next combination; its pair comes back with the next light."""
-        cost, least, pair, number = heapq.heappop(queue)
-        if number == 0:
-            self.counts["views"] += 1
-            self.report("pairs of camera and lens", self.counts["views"], self.counts["views"] + len(queue))
-        seen = self.ahead.views(pair, queue)
+        """Look at the next combination more closely: at what its pair promises, then rate it with its light.
+
+        A pair that promises enough comes back in its place among those of equal cost, a rated one with its next light.
+        """
+        at = _, promise, pair, number = heapq.heappop(queue)
+        if pair not in self.begun:
+            self._begin(queue, at, limit)
+            return None
+        if self._is_hopeless(promise, limit):
+            self.out[PLACES] += number == 0
+            return None
+        seen = self.ahead.views(pair)
         if isinstance(seen, str):
             self.out[seen] += 1
             return None
-        beaten = min(floor(self.problem, each) for each in seen) > limit
-        record = min((each.ratio for each in self.offers), default=math.inf)
-        if beaten and not self._worth(seen, record):
+        seen = tuple(each for each in seen if not self._is_hopeless(floor(self.problem, each), limit))
+        if not seen:
             self.out[PLACES] += number == 0
             return None
-        return self._rated(queue, (cost, least, pair, number), seen, beaten)
+        return self._rated(queue, at, seen, min(floor(self.problem, each) for each in seen) > limit)
 
-    def _worth(self, seen: tuple[Viewed, ...], record: float) -> bool:
-        """Whether a pair that does not meet all may still be the best of its cost."""
-        return min(floor(self.problem, each) for each in seen) < record * BETTER
+    def _begin(self, queue: list[At], at: At, limit: float) -> None:
+        """Ask what a pair promises; it comes back where that is enough."""
+        cost, least, pair, number = at
+        self.begun.add(pair)
+        self.counts["views"] += 1
+        self.report("pairs of camera and lens", self.counts["views"], self.counts["views"] + len(queue))
+        promise = self.ahead.promised(pair, queue)
+        if isinstance(promise, str):
+            self.out[promise] += 1
+        elif self._is_hopeless(promise, limit):
+            self.out[PLACES] += 1
+        else:
+            heapq.heappush(queue, (cost, max(least, promise), pair, number))
+
+    def _is_hopeless(self, ratio: float, limit: float) -> bool:
+        """Whether what has at least this ratio neither meets the limit nor may be the best of its cost."""
+        record = min((each.ratio for each in self.offers), default=math.inf)
+        return ratio > limit and ratio >= record * BETTER
 
     def _rated(self, queue: list[At], at: At, seen: tuple[Viewed, ...], beaten: bool) -> Offer | None:
-        cost, least, pair, number = at
+        cost, _, pair, number = at
         self.counts["rated"] += 1
         found = self.ahead.rated(pair, number, seen)
-        offer = None if isinstance(found, str) else Offer(cost, found, order=(pair, number), least=least)
+        offer = None if isinstance(found, str) else Offer(cost, found, order=(pair, number), least=self.least[pair])
         if offer is None:
             self.counts[found] += 1
         else:
@@ -184,21 +210,20 @@ class _Search:
 
     def _put_back(self, queue: list[At], at: At) -> None:
         """A pair, with its next light."""
-        cost, least, pair, number = at
+        cost, promise, pair, number = at
         if number + 1 < len(self.lights):
             more = cost - self._light_cost(number) + self._light_cost(number + 1)
             if more <= (self.problem.wishes.budget or math.inf):
-                heapq.heappush(queue, (more, least, pair, number + 1))
+                heapq.heappush(queue, (more, promise, pair, number + 1))
 
-    def _closest(self, passing: list[Offer], queue: list[At]) -> Offer | None:
-        """The first, by preference, that meets all when it is looked at closely; the others' next lights may do."""
-        for offer in sorted(passing, key=lambda each: each.preference):
-            close, pair = self._look(offer), offer.order[0]
-            if close is not None and close.ratio <= 1:
-                return close
-            self.contradicted[pair] += close is not None
-            if self.contradicted[pair] < _CONTRADICTED:  # of thousands of lights each would be looked at
-                self._put_back(queue, (offer.cost, offer.least, *offer.order))
+    def _met(self, offer: Offer, queue: list[At]) -> Offer | None:
+        """An offer that meets all when it is looked at closely; else its pair comes back with its next light."""
+        close, pair = self._look(offer), offer.order[0]
+        if close is not None and close.ratio <= 1:
+            return close
+        self.contradicted[pair] += close is not None
+        if self.contradicted[pair] < _CONTRADICTED:  # of thousands of lights each would be looked at
+            self._put_back(queue, (offer.cost, offer.least, *offer.order))
         return None
 
     def _probed(self, offer: Offer) -> Offer | None:
@@ -240,15 +265,23 @@ class _Search:
 
     def _front(self, queue: list[At], winner: Offer | None) -> None:
         """Look for less U at more cost, best promise first, for a number of pairs."""
-        if winner is None or not queue:
+        if winner is None:
             return
-        allowed = self.counts["views"] + self.beside
-        while queue and self.counts["views"] < min(allowed, self.most + self.beside):
-            record = min(each.ratio for each in self.offers)
-            if queue[0][1] >= record * BETTER:
-                heapq.heappop(queue)
-                self.out["no better"] += 1
-                continue
+        allowed = min(self.counts["views"], self.most) + self.beside
+        while queue and self.counts["views"] < allowed:
+            self._next_better(queue)
+        begun = [each for each in queue if each[2] in self.begun and each[3] == 0]
+        heapq.heapify(begun)
+        while begun and begun[0][3] == 0:
+            self._next_better(begun)
+
+    def _next_better(self, queue: list[At]) -> None:
+        """The next that may have less U than all before."""
+        record = min(each.ratio for each in self.offers)
+        if queue[0][1] >= record * BETTER:
+            heapq.heappop(queue)
+            self.out["no better"] += 1
+        else:
             self._next(queue, record * BETTER)
 
     def _told(self, winner: Offer | None, complete: bool) -> Design:

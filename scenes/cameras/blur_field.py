@@ -14,6 +14,7 @@ from scenes.model import Model
 from scenes.ranges import Fraction, Positive
 
 _LEAST, _MOST = 0.1, 20.0  # times the blur in the middle
+_ROWS = 32  # of a table that stands for a field
 _LOOKED = np.linspace(0, 1, 1001)  # squared image heights
 Contrast = Annotated[float, Field(ge=0.01, le=0.999)]
 
@@ -77,6 +78,19 @@ class BlurField(Model):
     def least(self) -> float:
         """The smallest."""
         return float(self.times(_LOOKED).min())
+
+    def smoothed(self, blur_px: float, added_px: float) -> BlurField:
+        """The field of images that are blurred by ``added_px`` on top, the blur in the middle ``blur_px`` before.
+
+        >>> field = BlurField(polynomial=(2.0,)).smoothed(3.0, 4.0)
+        >>> round(5.0 * float(field.times(1.0)), 6) == round(math.hypot(9.0, 4.0), 6)
+        True
+        """
+        if added_px == 0:
+            return self
+        heights = np.linspace(0, 1, _ROWS + 1)[1:]
+        blur = np.hypot(blur_px * self.times(heights**2), added_px) / math.hypot(blur_px, added_px)
+        return BlurField(table=tuple(zip(heights.tolist(), blur.tolist(), strict=True)))
 
     def middle_um(self) -> float | None:
         """Standard deviation of the blur in the middle that ``mtf`` says, um on the sensor; None without it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -199,11 +200,15 @@ def shining(shape: dict[str, Any], axes: np.ndarray, radiance: float) -> dict[st
     return {**placed, "bsdf": BLACK, "emitter": emitter}
 
 
+@lru_cache(maxsize=64)
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gauss nodes and weights of [0, 1], and unit vectors (2 count, 3) evenly around the axis."""
     x, weight = np.polynomial.legendre.leggauss(count)
     angle = (np.arange(2 * count) + 0.5) * np.pi / count
-    return (x + 1) / 2, weight / 2, np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], -1)
+    found = (x + 1) / 2, weight / 2, np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], -1)
+    for each in found:
+        each.setflags(write=False)
+    return found
 
 
 def annulus(inner: float, outer: float, tilt: float, count: int) -> Surface:

@@ -66,10 +66,8 @@ def test_linear_and_nonlinear_values_agree() -> None:
     given, here = sources(scene), Station.nominal(features.pictures)
     slopes = sensitivities(features, given, biased=False)
     sizes = np.array([source.told.u for source in given]) / 10
-    moved = [
-        [features.errors(s.moved(here, sign * size)) for sign in (1, -1)] for s, size in zip(given, sizes, strict=True)
-    ]
-    values = believed(picture, np.array(moved).reshape(2 * len(given), -1)).reshape(len(given), 2, -1)
+    moved = [s.moved(here, sign * size) for s, size in zip(given, sizes, strict=True) for sign in (1, -1)]
+    values = believed(picture, features.errors(moved)).reshape(len(given), 2, -1)
     differences = (values[:, 0] - values[:, 1]) / (2 * sizes[:, None])
     assert np.abs(differences - slopes.T).max() < 1e-5 * np.abs(slopes).max()
     assert np.abs(1.3 * differences - slopes.T).max() > 1e-2 * np.abs(slopes).max()

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from mpmath import mp, mpf
-from scipy.ndimage import binary_erosion
+from scipy.ndimage import binary_erosion, gaussian_filter1d
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
@@ -23,6 +23,7 @@ from imaging.blurred.model import BlurredModel
 from imaging.geometry.blur import blur_in_focus, blur_times, drift
 from imaging.light.illumination import fall, illumination
 from imaging.pictures import Pictures
+from measure.fitting.likelihood import seen_coarsely
 from measure.photo.blur_field import BlurredSides, blurred_sides, fitted_field
 from planner.budgeting.sources import sources
 from render.optics import blur_and_bin
@@ -34,6 +35,7 @@ from scenes.photograph import Photograph
 from tests.commands import ice
 from tests.proofs import field_blur
 from validation import fitted_scene
+from validation.explore import preview
 
 PRECISE = Ops(mp.sqrt, mp.exp, mp.log, min, max, lambda c, a, b: a if c else b)
 FIELD = {"polynomial": [1.0, 0.5]}
@@ -54,6 +56,45 @@ def test_a_table_is_kept_and_a_polynomial_is_one():
     assert table.most == pytest.approx(2)
     h = np.linspace(0, 1, 7)
     assert BlurField(polynomial=(0.7, -0.2)).times(h**2) == pytest.approx(1 + 0.7 * h**2 - 0.2 * h**4, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("field", "off"), [({"polynomial": (1.5, -0.5)}, 1e-4), ({"table": ((0.3, 1.1), (0.8, 2.5))}, 0.02)]
+)
+def test_smoothed_images_are_blurred_by_both(field, off):
+    """Variances add at every place, beside the kink where a table ends to 2 %; the ratios as they were are 30 % off."""
+    one, h2 = BlurField(**field), np.linspace(0, 1, 101)
+    both = 5.0 * one.smoothed(3.0, 4.0).times(h2)
+    assert both == pytest.approx(np.hypot(3.0 * one.times(h2), 4.0), rel=off)
+    assert np.abs(5.0 * one.times(h2) / both - 1).max() > 0.3
+    assert one.smoothed(3.0, 0.0) is one
+
+
+def test_a_coarse_view_of_a_fit_is_the_smoothed_picture():
+    """Fewer pixels, smoothed by 1.5 of them: at corners and in the middle the blurs' variances add."""
+    scene = scenes.load("task1")
+    scene = scene.with_(camera={"blur_field": {"polynomial": [3.0]}})
+    picture = Pictures.of(scene, *map(np.array, ((30.0, 135.0), (15.0, 315.0))))
+    coarse = seen_coarsely(picture, 2, 1.5).scene.camera
+    places = np.array([[10.0, 8.0], [coarse.width / 2, coarse.height / 2], [coarse.width - 9.0, 30.0]])
+    alone = blur_in_focus(scene.camera, 2 * places + 0.5) / 2
+    assert blur_in_focus(coarse, places) == pytest.approx(np.hypot(alone, 1.5), rel=2e-3)
+    assert blur_in_focus(seen_coarsely(picture, 2, 0.0).scene.camera, places) == pytest.approx(alone, rel=2e-3)
+
+
+def test_a_preview_is_as_blurred_as_its_places_are():
+    """Edges in the middle and in a corner of an enlarged part: within 2 of 255 levels of Gaussians of these places.
+
+    Blurred as in the middle, the corner's edge is off by more than 30.
+    """
+    some, part = camera(blur_px=1.0, blur_field={"polynomial": [4.0]}), preview.Window(100, 50, 300, 250)
+    for x, y in ((200.0, 150.0), (385.0, 290.0)):
+        canvas = np.zeros((500, 600), np.float32)
+        canvas[:, round(2 * (x - 99.5)) :] = 255.0
+        row = preview._blurred(canvas, some, part)[round(2 * (y - 49.5))]
+        sigma = 2 * float(blur_in_focus(some, np.array([x, y])))
+        assert np.abs(row - gaussian_filter1d(canvas[0], sigma, mode="nearest")).max() < 2 * (2 if x > 200 else 1)
+    assert np.abs(row - gaussian_filter1d(canvas[0], 2.0, mode="nearest")).max() > 30
 
 
 def test_a_transfer_says_the_gaussian_that_has_it():

@@ -93,7 +93,9 @@ def test_levels_count_to_first_order(monkeypatch):
     asked = []
     monkeypatch.setattr(chain, "believed", lambda picture, errors: np.stack([errors, 10 * errors], -1))
     budget = SimpleNamespace(sources=SOURCES, picture=KNOWN, sensitivities=LINEAR)
-    budget.features = SimpleNamespace(errors=lambda station: asked.append(station) or len(station) / 4)
+    budget.features = SimpleNamespace(
+        errors=lambda stations: asked.extend(stations) or np.array([len(each) / 4 for each in stations])
+    )
     one = chain.Chain(budget)
     one.__dict__["here"] = ("here",)
     found = one.exact(np.array([[0.5, 0.1, -2.0], [0.0, 0.3, 1.0]]))
@@ -144,7 +146,7 @@ def test_variance_by_inputs_that_move_places(monkeypatch):
     scene = SimpleNamespace(quantities=(1, 2), uncertainty=SimpleNamespace(covariance=told), free=(0,))
     monkeypatch.setattr(plans.Pictures, "of", lambda *_: None)
     known = SimpleNamespace(known=SimpleNamespace(quantities=scene.quantities))
-    monkeypatch.setattr(plans, "Features", lambda pictures: known)
+    monkeypatch.setattr(plans, "Features", lambda pictures, of_rims: known)
     monkeypatch.setattr(plans, "sensitivities", lambda features, still, biased: slopes[:, : len(still)])
     a, b, c = (slopes * [0.3, 0.5, 2.0]).T
     expected = a**2 + b**2 + c**2 - 1.2 * a * b
@@ -220,7 +222,7 @@ def test_places_that_datums_tell_count_to_first_order(monkeypatch):
     placement = Placement(source="datums", datums=("e1",), datum_sd=0.0)
     budget = SimpleNamespace(sources=sources, sensitivities=np.array([[3.0, 0.0], [0.5, 0.0]]))
     budget.picture = SimpleNamespace(scene=SimpleNamespace(placement=placement))
-    budget.features = SimpleNamespace(errors=lambda station: asked.append(station) or 0.0)
+    budget.features = SimpleNamespace(errors=lambda stations: asked.extend(stations) or np.zeros(len(stations)))
     one = chain.Chain(budget)
     one.__dict__["here"] = ("here",)
     assert one.exact(np.array([[2.0, 0.5]])) == pytest.approx(np.array([[6.0, 1.0]]))

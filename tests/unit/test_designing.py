@@ -17,7 +17,7 @@ from planner.designing.close import Close, look
 from planner.designing.dominance import of_light, of_sensor, undominated
 from planner.designing.evaluation import OWN_LIGHT, Problem, Rated, limit_ratio, rate, rate_light, views
 from planner.designing.optics import ROLLING, TIME, Focused, blur_um, chosen, focused
-from planner.designing.outcome import Design, Offer, Tally
+from planner.designing.outcome import Design, Offer, Tally, to_three
 from planner.designing.search import design
 from planner.designing.stations import carried, station
 from planner.designing.usable import COLOUR, CONTRADICTORY, INCOMPLETE, LARGE, PRICELESS, usable
@@ -25,7 +25,7 @@ from planner.designing.wishes import Wishes, allowed
 from planner.uncertainty.risks import Limits, global_risks
 from scenes import InvalidInput, Jitter, Uncertainty, catalogue
 from scenes.cameras.covariance import Covariance
-from scenes.catalogue import Catalogue, ListedLens, ListedLight
+from scenes.catalogue import Catalogue, ListedLens, ListedLight, ListedSensor
 from tests.benchmarks.design import brute_force, synthetic
 from validation import designed
 
@@ -45,6 +45,47 @@ def test_the_winner_is_that_of_all_combinations(seed: int, k: float) -> None:
         assert by_search.best.cost == pytest.approx(by_all[0], rel=1e-12)
         assert by_search.best.rated.names == by_all[1]
         assert by_search.searched.rated < 6 * 14 * 4 / 4
+
+
+def test_of_equal_cost_the_least_ratio_wins() -> None:
+    """Without prices all lenses and lights before one camera cost the same; each pair has the first light that does."""
+    priced, problem = synthetic(11, 1, 40, 3), _problem(1.5)
+    glass = next(each for each in priced.lenses if each.focal_length_mm == 25.0)
+    lenses = [glass.model_copy(update={"name": f"{focal}", "focal_length_mm": focal, "image_circle_mm": 40.0})
+              for focal in (12.0, 16.0, 25.0)]  # fmt: skip
+    given = priced.model_copy(update={"lenses": tuple(lenses), "lights": priced.lights[::2]})
+    tables = {name: tuple(each.model_copy(update={"price": None}) for each in getattr(given, name))
+              for name in ("sensors", "lenses", "lights")}  # fmt: skip
+    found = design(problem, given.model_copy(update=tables), beside=0)
+    each_pair = [_first_that_does(problem, tables["sensors"][0], lens, tables["lights"]) for lens in tables["lenses"]]
+    ratios = sorted(ratio for ratio in each_pair if ratio is not None)
+    assert len(ratios) == 3
+    assert to_three(found.best.ratio) == to_three(ratios[0]) < to_three(ratios[1])
+
+
+def _first_that_does(
+    problem: Problem, camera: ListedSensor, lens: ListedLens, lights: tuple[ListedLight, ...]
+) -> float | None:
+    for light in lights:
+        rated = rate(problem, camera, lens, light)
+        if isinstance(rated, Rated) and rated.ratio <= 1 and (close := look(problem, rated)).ratio <= 1:
+            return close.ratio
+    return None
+
+
+def test_straight_edges_alone_promise_no_less_than_all_features() -> None:
+    """Of a bracket's requirements three are of edges alone: these are told as with the circles, the others nothing."""
+    problem, parts = _problem(4.0, "bracket_station"), catalogue.load("sample")
+    camera = next(each for each in parts.sensors if "C-158m" in each.name)
+    lens = next(each for each in parts.lenses if "FA2524" in each.name)
+    rough, whole = (views(problem, camera, lens, of_rims=of_rims) for of_rims in (False, True))
+    straight = np.array([each.name in ("step", "across", "square") for each in problem.scene.quantities])
+    edges = {each.aspect.pose: each.systematic for each in rough}
+    assert len(edges) == len(whole) > 1
+    for view in whole:
+        assert edges[view.aspect.pose][straight] == pytest.approx(view.systematic[straight], rel=1e-12)
+        assert (edges[view.aspect.pose][~straight] == 0).all()
+        assert (view.systematic > 0).all()
 
 
 def test_bounds_leave_out_no_pair_that_may_do() -> None:

@@ -1,12 +1,38 @@
 """How a circle is found again in a picture of another station: the fit of its rim, and where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import scenes
 from imaging.features.circles import RimImage
 from planner.budgeting.features import _fit
+from planner.budgeting.station import Station, records
 
 POINTS = 7
+
+
+def test_stations_are_recorded_together(rng):
+    """From straight above, by a pinhole's formula: of two cameras, part and axis beside their places, turned."""
+    scene = scenes.load("task1")
+    scene = scene.with_(camera={**scene.camera.model_dump(), "lens": {}, "look_at": (0.0, 0.0, 0.0), "roll_deg": 0.0})
+    other = scene.with_(camera={**scene.camera.model_dump(), "focal_px": 1.5 * scene.camera.focal_px})
+    here = Station(scene, np.zeros(2), ())
+    moved = replace(here, shift=(0.3, -0.2, 0.5), principal_px=(2.0, -3.0), stretch=(1.01, 0.98))
+    stations = [here, replace(moved, scene=other), moved, replace(moved, roll_deg=90.0)]
+    points = rng.uniform(-1, 1, (5, 3))
+    x, y, z = (points + np.array(moved.shift)).T
+    width, height, distance = scene.camera.width, scene.camera.height, scene.camera.distance
+    middle = np.array([width - 1, height - 1]) / 2
+    scale = scene.camera.focal_px / (distance - z)
+    aside = middle + np.array(moved.principal_px)
+    found = records(stations, points)
+    plain = middle + scene.camera.focal_px * points[:, 1::-1] / (distance - points[:, 2:])
+    assert found[0] == pytest.approx(plain, abs=1e-9)
+    assert found[2] == pytest.approx(aside + np.stack([1.01 * scale * y, 0.98 * scale * x], -1), abs=1e-9)
+    assert found[1] - aside == pytest.approx(1.5 * (found[2] - aside), abs=1e-9)
+    assert found[3] == pytest.approx(aside + np.stack([1.01 * scale * x, -0.98 * scale * y], -1), abs=1e-9)
 
 
 def rim(rng, **parts):

@@ -28,6 +28,9 @@ from imaging.geometry.projection import (
 from imaging.geometry.visibility import hidden_spans, seen
 from imaging.pictures import Pictures
 from planner.budgeting.budgets import budget
+from planner.budgeting.features import Features
+from planner.budgeting.products import products
+from planner.budgeting.sources import sources
 from scenes import Camera, InvalidInput, Picture, Telecentric
 from scenes.numbers import with_number
 from scenes.parts.surfaces import Cone, Cylinder, Sphere, Torus
@@ -366,6 +369,15 @@ def test_a_limit_of_unknown_sign_and_a_height_act_together(plate):
     assert found["telecentricity x depth"] == pytest.approx(6 * per_degree / RADIUS * HIGHER, rel=1e-3)
     assert found.get("camera.telecentricity_deg", 0.0) < 1e-9
     assert found.get("part_shift.z", 0.0) < 1e-9
+
+
+def test_a_limit_of_unknown_sign_alone_has_no_product(plate):
+    """Where nothing else of the picture is uncertain, and where the angle is not."""
+    for camera, count in (({"telecentricity_deg": {"value": 0.0, "half_width": 0.1}}, 1), ({}, 0)):
+        scene = plate.with_(camera=camera, uncertainty={"part_shift": None})
+        given = sources(scene)
+        assert len(given) == count
+        assert products(Features(Pictures.of(Picture.of(scene, (0, 90)))), given).tolist() == [0.0]
 
 
 def test_what_is_out_of_focus_is_as_blurred_in_a_render_as_is_told():

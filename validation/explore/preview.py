@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from imaging.features.projected_edges import projected_edges
+from imaging.geometry.blur import blur_in_focus
 from imaging.geometry.lens import image_centre, undistorted
 from imaging.geometry.projection import depth, facing, project, ray_origins, rays
 from imaging.geometry.rays import first_face, has_embree
@@ -17,7 +18,7 @@ from imaging.light.appearance import face_signal, seen_at
 from imaging.pictures import Pictures
 from imaging.sensor import full_scale
 from planner.prediction import glanced
-from scenes import Circle, Picture, Scene
+from scenes import Camera, Circle, Picture, Scene
 from scenes.results import finite
 from scenes.status import GLANCED, OK
 from validation.explore.answers import Answer
@@ -28,6 +29,7 @@ _FINE = 2  # drawn this many times finer, then averaged
 _COARSE = 2  # times fewer pixels each way of what is sketched
 _MANY = 5000  # triangles from which on rays are quicker
 _CHORDS = 48
+_BLURS = 5  # that are drawn of a blur that varies
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def drawn(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
     places = np.rint(np.clip(image.reshape(-1, 3, 2), -8191, 8191) * 4).astype(np.int32)
     for t in order:
         cv2.fillConvexPoly(canvas, places[t], float(levels[t]), shift=2)
-    canvas = _blurred(canvas, scene.camera.blur_px * scale)
+    canvas = _blurred(canvas, scene.camera, part)
     small = cv2.resize(canvas, (shape[1] // _FINE, shape[0] // _FINE), interpolation=cv2.INTER_AREA)
     return shades(scene, small + scene.noise.dark_level)
 
@@ -98,7 +100,7 @@ def sketched(scene: Scene, picture: Picture, part: Window) -> np.ndarray:
     met = face >= 0
     canvas = np.full(shape, _beside(pictures, scene), np.float32)
     canvas[met] = face_signal(pictures, start[met] + away[met][:, None] * seen[met], face[met], 1)
-    return shades(scene, _blurred(canvas, scene.camera.blur_px * scale) + scene.noise.dark_level)
+    return shades(scene, _blurred(canvas, scene.camera, part) + scene.noise.dark_level)
 
 
 def _seen(pictures: Pictures, part: Window, shape: tuple[int, int]) -> np.ndarray:
@@ -110,8 +112,20 @@ def _seen(pictures: Pictures, part: Window, shape: tuple[int, int]) -> np.ndarra
     return undistorted(places, camera) - image_centre(camera)
 
 
-def _blurred(canvas: np.ndarray, sigma: float) -> np.ndarray:
-    """By the lens, standard deviation in pixels of the canvas."""
+def _blurred(canvas: np.ndarray, camera: Camera, part: Window) -> np.ndarray:
+    """By the lens; where its blur varies over the field, between the next of some that are drawn."""
+    scale = canvas.shape[1] / part.width
+    if camera.blur_field is None:
+        return _spread(canvas, camera.blur_px * scale)
+    y, x = ((np.arange(n) + 0.5) / scale - 0.5 for n in canvas.shape)
+    sigma = blur_in_focus(camera, np.stack(np.meshgrid(part.left + x, part.top + y), -1)) * scale
+    drawn = np.linspace(sigma.min(), sigma.max(), _BLURS)
+    at = np.interp(sigma, drawn, np.arange(_BLURS)).astype(np.float32)
+    return sum(np.maximum(0, 1 - np.abs(at - k)) * _spread(canvas, float(each)) for k, each in enumerate(drawn))
+
+
+def _spread(canvas: np.ndarray, sigma: float) -> np.ndarray:
+    """By a Gaussian of so many pixels of the canvas."""
     return cv2.GaussianBlur(canvas, (0, 0), sigma) if sigma > 0.3 else canvas
 
 
