@@ -4,13 +4,13 @@ import ice_vision
 
 ice_vision.check(__file__, "scenes", "imaging")
 
+from measure.best import best_estimator
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.chessboard import Board, chessboard
 from measure.boards.dots import dot_grid
 from measure.bounds import bound
 from measure.correction import Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
-from measure.estimators.registry import best_estimator
 from measure.features.conic import Ellipse, fit_ellipse
 from measure.find.candidate import Candidate
 from measure.find.ellipse import find_ellipse

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from measure.best import best_estimator
 from measure.covariances import less_bias, of_measured
-from measure.estimators.registry import best_estimator
 from measure.features.forms import FoundForm
 from measure.known_bias import Correction
 from measure.measurement import Measurement, check_method, checked_image, of_first
@@ -165,7 +165,7 @@ def measure(
         _check_same(correction, picture, estimator, threshold)
         (found,) = measure_by(image, picture, ((correction.estimator, correction.threshold),))
         return corrected(found, correction, image)
-    (found,) = measure_by(image, picture, ((estimator or best_estimator(picture.scene), threshold),))
+    (found,) = measure_by(image, picture, ((estimator or best_estimator(picture), threshold),))
     return found
 
 

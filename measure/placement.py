@@ -10,7 +10,7 @@ import numpy as np
 
 from imaging.light.appearance import is_plain
 from imaging.placed import combined, placed
-from measure.estimators.registry import best_estimator
+from measure.best import best_estimator
 from measure.features.board import by_board
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.quantities import MeasuredFeatures, find
@@ -105,7 +105,7 @@ def adjusted(
     may take levels from the lights.
     """
     here = before = np.asarray(start, float)
-    name = estimator or best_estimator(picture.scene)
+    name = estimator or best_estimator(picture)
     passes = [(DEFAULT_ESTIMATOR, False)]
     if name != DEFAULT_ESTIMATOR and is_plain(picture.scene) and picture.lights:
         passes.append((name, True))

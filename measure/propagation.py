@@ -19,8 +19,9 @@ from measure.estimators.separate import SeparateEstimator
 from measure.features import arranged
 from measure.features.board import BoardTool
 from measure.features.layout import Layout, layout_of
+from measure.features.line_noise import torn
 from measure.features.rims import circle_response, tells_errors
-from measure.features.shape import prepared, torn
+from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
 from measure.quantities import MeasuredFeatures, find
 from measure.unevenness import Unevenness
@@ -212,7 +213,6 @@ def _of_lines(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of edges that are not measured
         if isinstance(tool, SeparateEstimator):
             near = tool.respond_within(clean, asked=_is_in_place(found, layout, estimator))
-            near[np.repeat(torn(clean, layout, estimator, limit), 2)] = np.nan
         else:
             near = tool.respond_within(clean)
     measured = np.isin(found.shape.edge_status[0], status.MEASURED)
@@ -220,7 +220,10 @@ def _of_lines(
     if not tool.pixels.size:
         return _none(len(near), clean.size)
     rows = sparse.csr_array(near)
-    return sparse.csr_array((rows.data, tool.pixels[rows.indices], rows.indptr), (len(near), clean.size))
+    rows = sparse.csr_array((rows.data, tool.pixels[rows.indices], rows.indptr), (len(near), clean.size))
+    lost = np.repeat(np.repeat(torn(clean, layout, estimator, limit, rows), 2), np.diff(rows.indptr))
+    rows.data[lost] = np.nan
+    return rows
 
 
 def _is_in_place(found: MeasuredFeatures, layout: Layout, estimator: str) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from imaging.light.appearance import is_plain
+from measure.best import best_estimator
 from planner.budgeting.budgets import SceneBudget, budget
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.capability import gauge, tur
@@ -56,17 +57,17 @@ def budget_of(picture: Picture, p: float = 0.95, *, rendered: bool = False) -> S
 
 def formulas_do(picture: Picture, statuses: tuple[str, ...]) -> bool:
     """Whether predicted noise and bias are all that there is: of one convex body, where nothing predicted is
-    doubtful."""
-    return all(map(is_trusted, statuses)) and is_plain(picture.scene) and not picture.scene.textures
+    doubtful, and the estimator is the one of which they are."""
+    plain = is_plain(picture.scene) and not picture.scene.textures
+    return plain and all(map(is_trusted, statuses)) and best_estimator(picture) == best_estimator(picture.scene)
 
 
 def simulated(picture: Picture) -> Correction:
     """The correction of a picture by its best estimator, kept on disk."""
-    import measure
     from validation import kept
     from validation.remeasured import Method
 
-    return kept.correction(picture, Method(measure.best_estimator(picture.scene)))
+    return kept.correction(picture, Method(best_estimator(picture)))
 
 
 def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 5.0) -> list[dict[str, Any]]:

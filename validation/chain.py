@@ -162,7 +162,7 @@ class Chain:
         if picture.scene.placement.is_estimated:
             found = _located(picture, exposures(), estimator)
         else:
-            (found,) = remeasured(picture, exposures(), (Method(estimator or best_estimator(picture.scene)),))
+            (found,) = remeasured(picture, exposures(), (Method(estimator or best_estimator(picture)),))
         for m, rows in enumerate(self.budget.terms):
             drawn = draw([row.as_input for row in rows], rng, count)
             found.object[:, m] += self.added(m, drawn, pictured=True)

@@ -67,15 +67,19 @@ class Information(NamedTuple):
 
         That of the most likely parameters given image and knowledge, to first order: knowledge does not scatter.
         """
-        held = np.diag(self.fisher) == 0
-        whole = self.fisher + np.where(held[:, None] | held, 0.0, self.known)
-        told = np.diag(whole)
-        some = told > self._least(told)
-        scale = 1 / np.sqrt(np.where(some, told, 1.0))
+        whole, some = self._whole()
+        scale = 1 / np.sqrt(np.where(some, np.diag(whole), 1.0))
         weak = np.where(some, _UNTOLD, 1.0)
         inverse = np.linalg.inv(whole * scale[:, None] * scale + np.diag(weak))
         inverse = inverse * scale[:, None] * scale * (some[:, None] & some)
         return inverse - inverse @ (whole - self.fisher) @ inverse
+
+    def _whole(self) -> tuple[np.ndarray, np.ndarray]:
+        """Information of image and knowledge together, (q, q), and of which parameters there is some, bool (q,)."""
+        held = np.diag(self.fisher) == 0
+        whole = self.fisher + np.where(held[:, None] | held, 0.0, self.known)
+        told = np.diag(whole)
+        return whole, told > self._least(told)
 
     def _least(self, told: np.ndarray) -> np.ndarray:
         """Information of each parameter that is none; of levels in proportion, for their unit is any."""
@@ -86,11 +90,15 @@ class Information(NamedTuple):
         return least
 
     def vertices(self) -> np.ndarray:
-        """Smallest covariance of all vertices' (x, y), px^2, shape (2 V, 2 V); 0 for those that are not free."""
+        """Smallest covariance of all vertices' (x, y), px^2, shape (2 V, 2 V); 0 for those that are not free.
+
+        What nothing tells may be anywhere: 1e12 px^2.
+        """
         free, count = self.model.free, len(self.model.arrangement.vertices)
         index = (2 * free[:, None] + [0, 1]).ravel()
+        untold = ~self._whole()[1][: index.size]
         whole = np.zeros((2 * count, 2 * count))
-        whole[np.ix_(index, index)] = self.covariance()[: index.size, : index.size]
+        whole[np.ix_(index, index)] = self.covariance()[: index.size, : index.size] + np.diag(untold / _LEAST)
         return whole
 
 

@@ -25,6 +25,7 @@ _ITERATIONS = 40
 _SETTLED = 3e-4  # of a standard deviation
 _BOW_SEEN = 1.0  # 1/px^2, information: bows of which an image tells less are left out
 _STRIDE = 8.0  # standard deviations that one iteration may go
+_ARRIVED = 1.0  # standard deviation: what still goes farther is not where it will be
 
 
 class Displaced(NamedTuple):
@@ -240,7 +241,8 @@ class Solved(NamedTuple):
         Chi-square of the pixels near the pieces, of the others, and of a bow in each piece (score test).
     left : ndarray, shape (n, q)
         How far the steps may be from the likelihood's maximum: what the last iteration changed, and the effect of the
-        highest order (that of all that is left out was seen to be up to 5 times as large, while it is small).
+        highest order (that of all that is left out was seen to be up to 5 times as large, while it is small); infinite
+        where the iterations have not arrived.
     """
 
     steps: np.ndarray
@@ -342,7 +344,9 @@ class Expansion:
         scores = (told - explained) @ bows
         bowed = np.einsum("ni,ij,nj->n", scores, np.linalg.pinv(information, hermitian=True), scores)
         squares = np.stack([whole - far, far, bowed], 1)
-        return Solved(steps, squares, np.abs(change) + np.abs(self._highest(steps)))
+        left = np.abs(change) + np.abs(self._highest(steps))
+        left[(np.abs(change) > _ARRIVED * self.scale).any(1)] = np.inf  # levels on their way: corners seem to rest
+        return Solved(steps, squares, left)
 
     @cached_property
     def bows(self) -> tuple[np.ndarray, np.ndarray]:

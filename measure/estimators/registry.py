@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from imaging.light.appearance import is_plain
 from measure.estimators import arrangement, canny, gradient, isophote, strip
 from measure.estimators.estimate import Estimator
 from measure.estimators.kinds import ESTIMATORS
 from measure.features.layout import Layout
-from scenes import InvalidInput, Scene
+from scenes import InvalidInput
 
 _ALIKE = ("strip", "arrangement")  # those that take pixels for independent and equally noisy
 SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement
@@ -17,17 +16,6 @@ for _name, _kind in {
     "strip": strip.STRIP, "arrangement": arrangement.ARRANGEMENT,
 }.items():  # fmt: skip
     ESTIMATORS.add(_name)(_kind)
-
-
-def best_estimator(scene: Scene) -> str:
-    """What an image of a scene is best measured by: ``arrangement`` where one convex body stands before darkness.
-
-    There it is the most precise, and tells by its goodness of fit whether the image is what it takes it for. Where
-    things hide or shade each other, and where a colour sensor's pixels are not alike or those of a row share noise,
-    ``gradient``, whose errors and bias the planner knows.
-    """
-    alike = scene.noise.colour is None and not scene.noise.is_shared
-    return "arrangement" if is_plain(scene) and alike else "gradient"
 
 
 def known_name(name: str) -> str:

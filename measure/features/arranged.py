@@ -44,6 +44,17 @@ def find_arranged(images: np.ndarray, layout: Layout, tool: ArrangementEstimator
 
 
 @BLAS.wrap(limits=1)
+def is_told(layout: Layout, tool: ArrangementEstimator) -> bool:
+    """Whether an image of a layout whose light is known tells its lines, and their errors are linear in its noise."""
+    shown = _shown(layout)
+    if not shown.size or not tool.pixels.size:
+        return True  # nothing is asked
+    if shown.size < len(layout.names):
+        tool = _only(tool, layout, tuple(shown))[0]
+    return not tool.is_lit or _expected_reliable(tool)
+
+
+@BLAS.wrap(limits=1)
 def goodness(images: np.ndarray, layout: Layout, tool: ArrangementEstimator) -> np.ndarray:
     """Goodness of fit of images (n, height, width), p-values (n,); NaN where edges are not seen."""
     probability = np.full(len(images), np.nan)

@@ -71,6 +71,12 @@ class Drawn:
         column = np.minimum(np.searchsorted(self.region, pixels), self.region.size - 1)
         return self.clean[pixels] + np.where(self.region[column] == pixels, self.noise[:, column], 0.0)
 
+    def whole(self, shape: tuple[int, int]) -> np.ndarray:
+        """Images of this shape, (n, height, width)."""
+        levels = np.tile(self.clean, (len(self), 1))
+        levels[:, self.region] += self.noise
+        return levels.reshape(len(self), *shape)
+
     def first_order(self, response: sparse.csr_array) -> np.ndarray:
         """Errors (n, p) of what answers to the noise by a linear response (p, pixels)."""
         return (sparse.csr_array(response[:, self.region]) @ self.noise.T).T

@@ -8,7 +8,6 @@ from functools import lru_cache
 from weakref import finalize
 
 import numpy as np
-from scipy.special import ndtr
 
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.estimate import Estimate, Estimator
@@ -29,8 +28,6 @@ _BATCH = 50  # images measured at a time: what they need then stays in the proce
 _MOST_PIXELS = 1 << 23  # ... pixels, 64 MiB, for where edges are sought anew images are copied, pass by pass
 _KEPT = 64  # estimators
 _TOOLS: OrderedDict[tuple[int, str, float], Estimator | ArrangementEstimator] = OrderedDict()
-_RARE = 1e-6  # probability below which no image is looked at from elsewhere
-_BIASED, _SCATTERED = 0.3, 0.25  # of a standard deviation and of a variance: more of a mixture is another law
 _LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
 
 
@@ -92,7 +89,8 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
     calipers = tool.calipers
     if any(caliper.status not in status.MEASURED for caliper in calipers):
         return shape
-    offsets, errors = _at_ends(tool, estimate, lines)
+    lengths = np.array([caliper.length for caliper in calipers])
+    offsets, errors = at_ends(estimate.level, estimate.slope, lengths), end_errors(lines, lengths)
     far = ~(np.abs(offsets) <= capture(ESTIMATORS[name].capture_px, errors)).all((1, 2))
     lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
     if not far.any() or passes == 0:
@@ -104,37 +102,6 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
         source[which], rows[which] = len(parts), np.arange(len(which))
         parts.append(_find(images[which], move, name, threshold, passes - 1))
     return gather(parts, source, rows)
-
-
-def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float) -> np.ndarray:
-    """Of which edges noise decides from where they are looked for, and with it where they are found, bool (E,).
-
-    In a noise-free image (height, width) some edge of which lies about as far from its expected place as an estimator
-    reaches: by chance it is beyond, and all are looked for from where they seem. Where that moves an edge by so much
-    that its mean, or its variance, is another one than propagation tells.
-    """
-    tool, images = prepared(layout, name, threshold), clean[None]
-    estimate = tool.estimate(images)
-    offsets, errors = _at_ends(tool, estimate, tool.covariance(estimate, images))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        beyond = ndtr(
-            -np.abs(np.abs(offsets) - capture(ESTIMATORS[name].capture_px, errors)) / errors
-        )  # or within, of those that are beyond
-        chance = 1 - np.prod(1 - np.nan_to_num(beyond))
-    if chance < _RARE or any(caliper.status not in status.MEASURED for caliper in tool.calipers):
-        return np.zeros(len(layout.names), bool)
-    key = np.round(np.clip(offsets[0], -1, 1) / _GRID) * _GRID
-    other = _find(images, _shifted(layout, tuple(key.ravel().tolist())), name, threshold, 0)
-    ends = np.array([caliper.at(np.array([0.0, caliper.length]), np.zeros(2)) for caliper in tool.calipers])
-    there = np.einsum("ei,eki->ek", other.normals[0], other.points[0][:, None] - ends)
-    moved = np.nan_to_num(np.abs(there - offsets[0]) / errors[0])  # what is not found there fails, and is counted so
-    return ((chance * moved > _BIASED) | (chance * (1 - chance) * moved**2 > _SCATTERED)).any(-1)
-
-
-def _at_ends(tool: Estimator, estimate: Estimate, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far each line lies from its expected edge at both ends, px, and standard deviations, (n, E, 2) each."""
-    lengths = np.array([caliper.length for caliper in tool.calipers])
-    return at_ends(estimate.level, estimate.slope, lengths), end_errors(lines, lengths)
 
 
 def _expectations(images, layout, offsets, far, lost, first):

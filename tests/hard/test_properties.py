@@ -35,6 +35,7 @@ materials = st.fixed_dictionaries({
     "extinction": st.one_of(st.just(0.0), log(-6, 2)), "roughness": log(-3, 0.3),
 })  # fmt: skip
 diffuse = st.just({"refractive_index": 1.0, "extinction": 0.0})
+gloss = {"specular_fraction": 0.97, "diffuse_reflectance": 0.25, "refractive_index": 1.0, "extinction": 0.0}
 
 
 def predicted(scene, sensor, light, model):
@@ -45,6 +46,7 @@ def predicted(scene, sensor, light, model):
 
 @few
 @given(sizes, poses, poses, materials, log(-6, 6), log(-3, 3), st.sampled_from(PRICES))
+@example([1.0, 1.0, 1.0], (0.0, 0.0), (0.0, 0.0), gloss, 1e-4, 1.0, "bound")  # nothing tells where a corner is
 def test_variance_is_positive_or_infinite_with_a_reason(size, sensor, light, material, exposure, sigma, model):
     """Any object, material, exposure, noise and pose, both poles and the lower hemisphere included."""
     scene = task1(object={"size": size}, material=material, camera={"exposure": exposure}, noise={"sigma": sigma})

@@ -3,7 +3,7 @@
 Camera and lights stand 10 to 50 degrees off the vertical, anywhere around; lights that go with the camera, or face it,
 stand where they do. Before a light that faces it the camera stands up to twice as far off as in the scene's settings:
 the light has to be behind the part. Measured is a value where a prediction without an image says that it can be,
-whatever its bias; then its bias is simulated and taken off, as `ice measure` does, by the scene's default estimator,
+whatever its bias; then its bias is simulated and taken off, as `ice measure` does, by the picture's default estimator,
 and it is counted whether it is `ok`. At least 90 % have to be.
 """
 
@@ -48,12 +48,11 @@ def measurable(picture: Picture) -> np.ndarray:
 def states(scene: Scene, poses: int, seed: int) -> list[str]:
     """Statuses, once corrected, of all values that are measurable at some poses that measure one at least."""
     rng, found = np.random.default_rng(seed), []
-    method = Method(measure.best_estimator(scene))
     for _ in range(_TRIES):
         picture = placed(scene, rng)
         some = measurable(picture)
         if some.any():
-            found.append(np.array(simulation.simulated(picture, method).status)[some])
+            found.append(np.array(simulation.simulated(picture, Method(measure.best_estimator(picture))).status)[some])
         if len(found) == poses:
             break
     return np.concatenate(found).tolist() if found else []

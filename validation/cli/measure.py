@@ -216,7 +216,7 @@ def _corrected(
     import measure
     from validation.remeasured import Method
 
-    method = Method(estimator or measure.best_estimator(picture.scene), threshold)
+    method = Method(estimator or measure.best_estimator(picture), threshold)
     plain = measure.measure(image, picture, estimator=method.locator, threshold=threshold)
     if not np.isfinite(plain.value).any():
         return plain
