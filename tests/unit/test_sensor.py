@@ -129,9 +129,9 @@ def test_pictures_taken_again_are_those_of_new_memory(said):
     noise = Noise(sigma=2.0, bits=8, dark_level=10.0, **said)
     where = np.zeros(image.shape, bool)
     where[3:9, 20:40] = True
-    exposer = Exposer(image, noise, where)
+    exposer = render.Exposer(image, noise, where)
     for k, count in enumerate((3, 2, 3, 5)):
-        new = expose(image, noise, np.random.default_rng(k), count, where)
+        new = render.expose(image, noise, np.random.default_rng(k), count, where)
         assert np.array_equal(exposer.take(np.random.default_rng(k), count, again=True), new)
         assert np.array_equal(exposer.take(np.random.default_rng(k), count), new)
     assert (new[:, 20:, :] == new[:1, 20:, :]).all()
