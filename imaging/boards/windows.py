@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 _HALF = 0.48  # of the way to the next corner
@@ -11,6 +13,42 @@ _REACH = 12.0  # px from the corner; edges are parabolas so far
 _BAND = 5.0  # px beside an edge: further away only levels are told
 FEWEST = 40  # pixels of a window that can be fitted
 _NARROWEST = 3.0  # px: half a square
+_FOUR = 4  # points of a homography
+_STRIP = 1.0  # px of white beside a dark square, clear of a marker
+_CLEAR = 3.0  # standard deviations of blur and pixel: 0.13 % of a marker's contrast is left
+
+
+@dataclass(frozen=True)
+class Marked:
+    """Markers in every second square, of which a window keeps clear: they are no part of a corner's image.
+
+    Attributes
+    ----------
+    gap : float
+        From a square's sides to its marker, in squares.
+    first : bool
+        Whether the square before the first inner corner has one.
+    """
+
+    gap: float
+    first: bool = False
+
+    def beyond(self, grid: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+        """How far pixels (n, m, 2) about each of the corners ``grid`` are past the gap along rows and columns, in
+        squares, (n, m, 2); minus infinity where no marker's square is."""
+        rows, columns = grid.shape[:2]
+        places = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+        corners, seen = grid.reshape(-1, 2), np.isfinite(grid).all(-1).ravel()
+        matrix = cv2.findHomography(corners[seen], places[seen])[0] if seen.sum() >= _FOUR else None
+        if matrix is None:
+            return np.full(pixels.shape, np.inf)
+        away = _projected(matrix, pixels) - _projected(matrix, corners)[:, None]
+        marked = (away.prod(-1) > 0) == (places.sum(1) % 2 == (0 if self.first else 1))[:, None]
+        return np.where(marked[..., None], np.abs(away) - self.gap, -np.inf)
+
+
+def _projected(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    return cv2.perspectiveTransform(points.reshape(1, -1, 2), matrix).reshape(points.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +77,23 @@ class Windows:
 
 
 def steps(grid: np.ndarray) -> np.ndarray:
-    """From each corner to the next along its row and its column, px: central differences, shape (rows, columns, 2, 2)
-    with the directions in the last but one axis."""
-    return np.stack([np.gradient(grid, axis=1), np.gradient(grid, axis=0)], 2)
+    """From each corner to the next along its row and its column, px, shape (rows, columns, 2, 2) with the directions in
+    the last but one axis: the mean of the steps from the one before and to the one behind, of those that are seen."""
+    with warnings.catch_warnings(action="ignore"):  # of corners without neighbours
+        return np.stack([np.nanmean(_both(np.diff(grid, axis=axis), axis), 0) for axis in (1, 0)], 2)
 
 
-def windows(image: np.ndarray, grid: np.ndarray) -> Windows:
-    """Of corners at about ``grid``, shape (rows, columns, 2), px; row by row."""
+def _both(step: np.ndarray, axis: int) -> np.ndarray:
+    """Steps (2, rows, columns, 2) to the next corner and from the last one; NaN where there is none."""
+    none = np.full_like(np.take(step, [0], axis), np.nan)
+    return np.stack([np.concatenate([step, none], axis), np.concatenate([none, step], axis)])
+
+
+def windows(image: np.ndarray, grid: np.ndarray, marked: Marked | None = None, blur: float = 0.0) -> Windows:
+    """Of corners at about ``grid``, shape (rows, columns, 2), px; row by row; without room where it is NaN.
+
+    Of markers they keep clear as far as a lens of such a blur, px, spreads these.
+    """
     corners, toward = grid.reshape(-1, 2), steps(grid).reshape(-1, 2, 2)
     height, width = image.shape
     reach = int(_REACH)
@@ -60,8 +108,13 @@ def windows(image: np.ndarray, grid: np.ndarray) -> Windows:
         apart = np.abs(area)[:, None] / length  # from one edge to the next parallel one
         near = (np.abs(along) * apart[:, 1:] < _BAND) | (np.abs(down) * apart[:, :1] < _BAND)
         own = (np.abs(along) < _HALF) & (np.abs(down) < _HALF)
+        room = apart.min(1) / 2 >= _NARROWEST
+        if marked:
+            clear = _CLEAR * np.hypot(blur, 12**-0.5)
+            own &= (marked.beyond(grid, pixels) * apart[:, None, ::-1] < -clear).any(-1)
+            room &= marked.gap * apart.min(1) - clear >= _STRIP
     inside = ((pixels >= 0) & (pixels < [width, height])).all(-1)
-    room = (apart.min(1) / 2 >= _NARROWEST) & ~(own & near & ~inside).any(1)
+    room &= ~(own & near & ~inside).any(1)
     there = _disjoint(own & near & inside & room[:, None], pixels, width)
     room &= there.sum(1) >= FEWEST
     return _packed(image, pixels, there, room)

@@ -19,20 +19,22 @@ def bends(grid: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     grid : ndarray, shape (rows, columns, 2)
-        Corners, (x, y) px.
+        Corners, (x, y) px; NaN where one is not seen.
     """
     rows, columns = grid.shape[:2]
-    degree = next((d for d, least in _DEGREES if rows * columns >= least and min(rows, columns) > d), 0)
     ideal = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
-    matrix = cv2.findHomography(ideal, grid.reshape(-1, 2))[0] if degree else None
+    seen = np.isfinite(grid).all(-1).ravel()
+    lines = [len(set(each)) for each in ideal[seen].T]
+    degree = next((d for d, least in _DEGREES if seen.sum() >= least and min(lines) > d), 0)
+    matrix = cv2.findHomography(ideal[seen], grid.reshape(-1, 2)[seen])[0] if degree else None
     if matrix is None:
         return np.zeros(grid.shape)
     straight = cv2.perspectiveTransform(ideal[None], matrix)[0]
-    middle, size = straight.mean(0), np.ptp(straight, axis=0).max() / 2
+    middle, size = straight[seen].mean(0), np.ptp(straight[seen], axis=0).max() / 2
     u, v = ((straight - middle) / size).T
     powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     left = grid.reshape(-1, 2) - straight
-    coefficients = np.linalg.lstsq(np.stack([u**i * v**j for i, j in powers], 1), left, rcond=None)[0]
+    coefficients = np.linalg.lstsq(np.stack([u**i * v**j for i, j in powers], 1)[seen], left[seen], rcond=None)[0]
 
     def second(by_u: int, by_v: int) -> np.ndarray:
         columns = [_derived(u, i, by_u) * _derived(v, j, by_v) for i, j in powers]

@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.special import chdtrc
 
 from imaging.boards.fitting import Crossings, crossing_rows, fit_crossings
-from imaging.boards.windows import steps, windows
+from imaging.boards.windows import Marked, steps, windows
 from measure.boards.approximate import approximate_corners
 from measure.boards.bend import bends
 from measure.photo.noise import noise_sigma
@@ -103,7 +103,7 @@ def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | 
         wanted = f"of {shape[0]} x {shape[1]} inner corners" if shape else "of at least 3 x 3 inner corners"
         raise InvalidInput(f"image must show a whole chessboard {wanted}, got none")
     noise = noise_sigma(image) if noise is None else float(noise)
-    return measured(image, grid, max(noise, _least_noise(image)))
+    return measured(image, grid, max(noise, least_noise(image)))
 
 
 def check_noise(noise: Any) -> None:
@@ -135,30 +135,35 @@ def check_shape(shape: Any) -> tuple[int, int] | None:
     return int(shape[0]), int(shape[1])
 
 
-def _least_noise(image: np.ndarray) -> float:
+def least_noise(image: np.ndarray) -> float:
     """That of rounding to whole grey levels; of numbers that are not rounded, that of the arithmetic."""
     return float(np.sqrt(1 / 12)) if (image == np.rint(image)).all() else 1e-9 * float(np.ptp(image)) + 1e-300
 
 
-def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
-    """The corners about ``grid``, shape (rows, columns, 2), px, under white noise of a standard deviation."""
+def measured(image: np.ndarray, grid: np.ndarray, noise: float, marked: Marked | None = None) -> Board:
+    """The corners about ``grid``, shape (rows, columns, 2), px, NaN where not seen, under white noise of a standard
+    deviation; beside markers, if there are any."""
     columns, rows = grid.shape[1::-1]
     shape = _start(grid)
     near = _NEAR * np.linalg.norm(steps(grid).reshape(-1, 2, 2), axis=-1).min(1)
+    seen, blur = np.isfinite(near), _ORDINARY
     for turn in range(_ROUNDS):
-        found = windows(image, grid)
+        found = windows(image, grid, marked, blur)
         room = found.room
         if not room.any():
-            return _nothing((columns, rows), noise)
+            return _named(_nothing((columns, rows), noise), seen)
         some, bend = found.some(room), bends(grid).reshape(-1, 2)[room] * (turn > 0)
         fitted = fit_crossings(some, shape[room], bend, _FINE if turn else _ROUGH)
         away = np.linalg.norm(fitted.shape[:, :2] - shape[room, :2], axis=1)
         fitted = replace(fitted, converged=fitted.converged & (away < near[room]))
         before, grid = grid, _moved(grid, room, fitted)
         shape[np.flatnonzero(room)[fitted.converged]] = fitted.shape[fitted.converged]
-        if turn and np.abs(grid - before).max() < _SETTLED:  # windows and bends are those of the corners as they are
+        blur = float(np.exp(np.median(fitted.shape[:, 4])))
+        if (
+            turn and np.nanmax(np.abs(grid - before)) < _SETTLED
+        ):  # windows and bends are those of the corners as they are
             break
-    return _board((columns, rows), room, fitted, noise, _clipped(image, some))
+    return _named(_board((columns, rows), room, fitted, noise, _clipped(image, some)), seen)
 
 
 def respond(image: np.ndarray, board: Board, grid: np.ndarray) -> sparse.csr_array:
@@ -192,6 +197,12 @@ def _nothing(shape: tuple[int, int], noise: float) -> Board:
     n = shape[0] * shape[1]
     nan = np.full((n, 2, 2), np.nan)
     return Board(shape, nan[:, 0], nan, (status.SHORT,) * n, nan[:, 0, 0], noise, np.nan)
+
+
+def _named(board: Board, seen: np.ndarray) -> Board:
+    """The board, whose corners that are not seen, or without neighbours, are told from those without room."""
+    told = zip(board.status, seen, strict=True)
+    return replace(board, status=tuple(each if here else status.NOT_VISIBLE for each, here in told))
 
 
 def _moved(grid: np.ndarray, room: np.ndarray, fitted: Crossings) -> np.ndarray:
