@@ -5,6 +5,7 @@ import ice_vision
 ice_vision.check(__file__, "scenes", "imaging")
 
 from measure.boards.camera import CameraCalibration, calibrate_camera
+from measure.boards.charuco import charuco
 from measure.boards.chessboard import Board, chessboard
 from measure.boards.dots import dot_grid
 from measure.bounds import bound
@@ -61,6 +62,7 @@ __all__ = [
     "blurred_sides",
     "bound",
     "calibrate_camera",
+    "charuco",
     "chessboard",
     "corrected",
     "correction",

@@ -14,7 +14,6 @@ _BAND = 5.0  # px beside an edge: further away only levels are told
 FEWEST = 40  # pixels of a window that can be fitted
 _NARROWEST = 3.0  # px: half a square
 _FOUR = 4  # points of a homography
-_STRIP = 1.0  # px of white beside a dark square, clear of a marker
 _CLEAR = 3.0  # standard deviations of blur and pixel: 0.13 % of a marker's contrast is left
 
 
@@ -112,7 +111,7 @@ def windows(image: np.ndarray, grid: np.ndarray, marked: Marked | None = None, b
         if marked:
             clear = _CLEAR * np.hypot(blur, 12**-0.5)
             own &= (marked.beyond(grid, pixels) * apart[:, None, ::-1] < -clear).any(-1)
-            room &= marked.gap * apart.min(1) - clear >= _STRIP
+            room &= marked.gap * apart.min(1) > clear
     inside = ((pixels >= 0) & (pixels < [width, height])).all(-1)
     room &= ~(own & near & ~inside).any(1)
     there = _disjoint(own & near & inside & room[:, None], pixels, width)

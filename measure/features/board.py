@@ -23,6 +23,7 @@ from imaging.sensor import recorded
 from measure.boards import chessboard, dots
 from measure.boards.chessboard import Board as MeasuredBoard
 from measure.boards.eccentricity import centroid
+from measure.boards.printed import Printed
 from measure.goodness import WORST
 from scenes import Board, InvalidInput, Picture, status
 from scenes.placement import limits, prior
@@ -70,7 +71,7 @@ def by_board(image: np.ndarray, picture: Picture) -> tuple[np.ndarray | None, fl
     """
     board, camera = picture.scene.placement.board, picture.scene.camera
     try:
-        found = (chessboard.chessboard if board.kind == "chessboard" else dots.dot_grid)(image, board.shape)
+        found = Printed(board.kind, board.shape).measured(image)
     except InvalidInput:
         return None, 0.0
     grid = undistorted(found.corners, camera).reshape(*found.shape[::-1], 2)

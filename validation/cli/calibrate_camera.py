@@ -32,6 +32,15 @@ class Options:
         str | None, typer.Option(metavar="9x6", help="Inner corners, or dots: columns x rows; counted when not given.")
     ] = None
     dots: Annotated[bool, typer.Option(help="The board is a grid of dots, not a chessboard.")] = False
+    charuco: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DICTIONARY", help="A ChArUco board: its markers, as DICT_5X5_100. Needs --shape, --marker."
+        ),
+    ] = None
+    marker: Annotated[
+        float | None, typer.Option(metavar="LENGTH", help="Side of the markers, of the same unit as --square.")
+    ] = None
     model: Annotated[
         str, typer.Option(help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none.")
     ] = "k1,k2,p1,p2,k3"
@@ -51,12 +60,15 @@ class Options:
 @commands.command("calibrate-camera")
 @taking(Options)
 def calibrate_camera_command(given: Options) -> None:
-    """Calibrate a camera from photographs of a chessboard or a grid of dots, seen from different directions.
+    """Calibrate a camera from photographs of a board, seen from different directions.
+
+    The board is a chessboard; with --dots a grid of dots; with --charuco, --marker and --shape a ChArUco board, of
+    which a part is enough.
 
     -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
     boards do not determine the focal length.
     """
-    wanted = _checked(given)
+    printed = _checked(given)
     import measure
     from measure.boards.parameters import read_model
     from scenes import status
@@ -68,7 +80,7 @@ def calibrate_camera_command(given: Options) -> None:
     camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
         size = camera and Size(camera.height, camera.width, scene)
-        seen = read_boards(given.boards, wanted, given.noise, shown, size, dots=given.dots)
+        seen = read_boards(given.boards, printed, given.noise, shown, size)
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
     found = measure.calibrate_camera(seen.boards, given.square, seen.image_shape, given.model, given.square_sd)
@@ -84,8 +96,8 @@ def calibrate_camera_command(given: Options) -> None:
     raise typer.Exit(1 if found.status == status.ILL_CONDITIONED else 0)
 
 
-def _checked(given: Options) -> tuple[int, int] | None:
-    """See that options are in their ranges; the board's inner corners, columns and rows, if they are given."""
+def _checked(given: Options):
+    """See that options are in their ranges; what is printed on the board."""
     from scenes.units import UNITS
 
     check_number("--square", given.square, 1e-9, _LONGEST)
@@ -93,10 +105,36 @@ def _checked(given: Options) -> tuple[int, int] | None:
     check_number("--noise", given.noise, 1e-6, 1e6)
     if given.units not in UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(UNITS)}, got {given.units!r}")
-    wanted = _shape(given.shape)
+    printed = _printed(given)
     check_file("--output", given.output, ".toml")
     check_file("--residuals", given.residuals, ".png")
-    return wanted
+    return printed
+
+
+def _printed(given: Options):
+    """The board that is asked for.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such board.
+    """
+    from measure.boards.printed import CHARUCO, CHESSBOARD, DOTS, Printed
+
+    shape, dictionary = _shape(given.shape), given.charuco
+    if dictionary is None:
+        if given.marker is not None:
+            raise InvalidInput(f"--marker must be left out of a board without markers, got {given.marker:g}")
+        return Printed(DOTS if given.dots else CHESSBOARD, shape)
+    if given.dots:
+        raise InvalidInput("--charuco must be left out of a grid of dots, got both")
+    if shape is None:
+        raise InvalidInput("--shape must be given of a board with markers, got none")
+    if given.marker is None or not 0 < given.marker < given.square:
+        raise InvalidInput(f"--marker must be more than 0 and less than --square, {given.square:g}, got {given.marker}")
+    printed = Printed(CHARUCO, shape, dictionary, given.marker / given.square)
+    printed.check()
+    return printed
 
 
 def _write_files(found, seen, output: Path | None, residuals: Path | None) -> list[Path]:
