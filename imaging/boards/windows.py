@@ -93,30 +93,80 @@ def windows(image: np.ndarray, grid: np.ndarray, marked: Marked | None = None, b
 
     Of markers they keep clear as far as a lens of such a blur, px, spreads these.
     """
-    corners, toward = grid.reshape(-1, 2), steps(grid).reshape(-1, 2, 2)
-    height, width = image.shape
-    reach = int(_REACH)
-    offset = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), -1).reshape(-1, 2)
-    pixels = np.rint(corners)[:, None] + offset
-    away = pixels - corners[:, None]
-    length = np.linalg.norm(toward, axis=-1)
-    with np.errstate(all="ignore"):
-        area = toward[:, 0, 0] * toward[:, 1, 1] - toward[:, 0, 1] * toward[:, 1, 0]
-        along = (away[..., 0] * toward[:, None, 1, 1] - away[..., 1] * toward[:, None, 1, 0]) / area[:, None]
-        down = (away[..., 1] * toward[:, None, 0, 0] - away[..., 0] * toward[:, None, 0, 1]) / area[:, None]
-        apart = np.abs(area)[:, None] / length  # from one edge to the next parallel one
-        near = (np.abs(along) * apart[:, 1:] < _BAND) | (np.abs(down) * apart[:, :1] < _BAND)
-        own = (np.abs(along) < _HALF) & (np.abs(down) < _HALF)
-        room = apart.min(1) / 2 >= _NARROWEST
-        if marked:
-            clear = _CLEAR * np.hypot(blur, 12**-0.5)
-            own &= (marked.beyond(grid, pixels) * apart[:, None, ::-1] < -clear).any(-1)
-            room &= marked.gap * apart.min(1) > clear
-    inside = ((pixels >= 0) & (pixels < [width, height])).all(-1)
-    room &= ~(own & near & ~inside).any(1)
-    there = _disjoint(own & near & inside & room[:, None], pixels, width)
-    room &= there.sum(1) >= FEWEST
-    return _packed(image, pixels, there, room)
+    seen = _Around.of(image, grid.reshape(-1, 2), steps(grid).reshape(-1, 2, 2))
+    own, room = (np.abs(seen.away) < _HALF).all(-1), np.ones(len(seen.apart), bool)
+    if marked:
+        clear = _clear(blur)
+        own &= (marked.beyond(grid, seen.pixels) * seen.apart[:, None] < -clear).any(-1)
+        room = marked.gap * seen.apart.min(1) > clear
+    return seen.packed(image, own, room)
+
+
+def wedges(image: np.ndarray, quads: np.ndarray, gap: float, cell: float, blur: float) -> Windows:
+    """Of the outer corners of dark markers, each the corner of one dark square; marker by marker.
+
+    They reach half way to the next marker, half way along its sides, and as far into it as its dark border does, clear
+    of what lies behind.
+
+    Parameters
+    ----------
+    image : ndarray, shape (height, width)
+    quads : ndarray, shape (n, 2, 2, 2)
+        About where the markers' corners are, row by row, px; NaN where one is not seen.
+    gap, cell : float
+        From marker to marker, and width of a marker's border, in sides of a marker.
+    blur : float
+        Of the lens, px.
+    """
+    toward = np.array([steps(quad) for quad in quads]).reshape(-1, 2, 2)
+    seen = _Around.of(image, quads.reshape(-1, 2), toward)
+    inward = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1)])
+    into = seen.away * np.tile(inward, (len(quads), 1))[:, None]
+    clear, apart = _clear(blur), seen.apart[:, None]
+    own = ((into < _HALF) & (into > -gap / 2) & ((into + gap) * apart > clear)).all(-1)
+    own &= ((into < 0) | ((into - cell) * apart < -clear)).any(-1)
+    return seen.packed(image, own, min(gap, cell) * seen.apart.min(1) > clear)
+
+
+def _clear(blur: float) -> float:
+    """px from what is dark to where no more than `_CLEAR` standard deviations of its image reach."""
+    return float(_CLEAR * np.hypot(blur, 12**-0.5))
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """Pixels about n corners: their places (n, m, 2), px; how far along both directions from the corner, in ways to the
+    next one, (n, m, 2); and px of such a way across the other direction, (n, 2)."""
+
+    pixels: np.ndarray
+    away: np.ndarray
+    apart: np.ndarray
+
+    @classmethod
+    def of(cls, image: np.ndarray, corners: np.ndarray, toward: np.ndarray) -> _Around:
+        """Of corners (n, 2) whose ways to the next ones are (n, 2, 2)."""
+        reach = int(_REACH)
+        offset = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), -1).reshape(-1, 2)
+        pixels = np.rint(corners)[:, None] + offset
+        away = pixels - corners[:, None]
+        with np.errstate(all="ignore"):
+            area = toward[:, 0, 0] * toward[:, 1, 1] - toward[:, 0, 1] * toward[:, 1, 0]
+            along = (away[..., 0] * toward[:, None, 1, 1] - away[..., 1] * toward[:, None, 1, 0]) / area[:, None]
+            down = (away[..., 1] * toward[:, None, 0, 0] - away[..., 0] * toward[:, None, 0, 1]) / area[:, None]
+            apart = np.abs(area)[:, None] / np.linalg.norm(toward, axis=-1)[:, ::-1]
+        return cls(pixels, np.stack([along, down], -1), apart)
+
+    def packed(self, image: np.ndarray, own: np.ndarray, room: np.ndarray) -> Windows:
+        """Windows of their own pixels (n, m) beside an edge, of those corners (n,) that may have room."""
+        height, width = image.shape
+        with np.errstate(invalid="ignore"):
+            own = own & (np.abs(self.away) * self.apart[:, None] < _BAND).any(-1)
+            room = room & (self.apart.min(1) / 2 >= _NARROWEST)
+        inside = ((self.pixels >= 0) & (self.pixels < [width, height])).all(-1)
+        room &= ~(own & ~inside).any(1)
+        there = _disjoint(own & inside & room[:, None], self.pixels, width)
+        room &= there.sum(1) >= FEWEST
+        return _packed(image, self.pixels, there, room)
 
 
 def _disjoint(there: np.ndarray, pixels: np.ndarray, width: int) -> np.ndarray:

@@ -9,7 +9,8 @@ import numpy as np
 
 from imaging.boards.windows import Marked
 from measure.boards.approximate import eight_bits
-from measure.boards.chessboard import Board, check_noise, check_shape, least_noise, measured
+from measure.boards.chessboard import Board, Squares, check_noise, check_shape, least_noise, measured
+from measure.boards.dictionaries import check_marker, read_dictionary
 from measure.photo.noise import noise_sigma
 from scenes.arrays import picture
 from scenes.errors import InvalidInput
@@ -51,7 +52,7 @@ def charuco(image: Any, shape: tuple[int, int], dictionary: str, marker: float, 
             "got none"
         )
     noise = noise_sigma(image) if noise is None else float(noise)
-    return measured(image, grid, max(noise, least_noise(image)), Marked((1 - float(marker)) / 2, first))
+    return measured(image, grid, max(noise, least_noise(image)), Squares(Marked((1 - float(marker)) / 2, first)))
 
 
 def charuco_boards(shape: Any, dictionary: Any, marker: Any) -> tuple[cv2.aruco.CharucoBoard, ...]:
@@ -74,38 +75,6 @@ def charuco_boards(shape: Any, dictionary: Any, marker: Any) -> tuple[cv2.aruco.
     older = cv2.aruco.CharucoBoard((columns + 1, rows + 1), 1.0, float(marker), board.getDictionary())
     older.setLegacyPattern(True)
     return board, older
-
-
-def check_marker(marker: Any) -> None:
-    """See that a marker's side over its square's is a number between.
-
-    Raises
-    ------
-    InvalidInput
-        If not.
-    """
-    number = isinstance(marker, int | float | np.number) and not isinstance(marker, bool)
-    if not (number and 0 < marker < 1):
-        raise InvalidInput(f"marker must be a number more than 0 and less than 1, got {marker!r}")
-
-
-def read_dictionary(name: Any, needed: int) -> cv2.aruco.Dictionary:
-    """A dictionary of OpenCV's, by its name, that has so many markers.
-
-    Raises
-    ------
-    InvalidInput
-        If there is none.
-    """
-    known = sorted(each for each in dir(cv2.aruco) if each.startswith("DICT_"))
-    if name not in known:
-        raise InvalidInput(f"dictionary must be one of {', '.join(known)}, got {str(name)[:80]!r}")
-    found = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
-    if len(found.bytesList) < needed:
-        raise InvalidInput(
-            f"dictionary must have the board's {needed} markers, got {name}, which has {len(found.bytesList)}"
-        )
-    return found
 
 
 def _approximate(image: np.ndarray, boards: tuple[cv2.aruco.CharucoBoard, ...]) -> tuple[np.ndarray | None, bool]:

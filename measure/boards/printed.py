@@ -8,9 +8,9 @@ from typing import Any
 from measure.boards.charuco import charuco, charuco_boards
 from measure.boards.chessboard import Board, check_shape, chessboard
 from measure.boards.dots import dot_grid
+from measure.boards.marker_grid import check_grid, marker_grid
 
-CHESSBOARD, DOTS, CHARUCO = "chessboard", "dots", "charuco"
-WITH_MARKERS = (CHARUCO,)
+CHESSBOARD, DOTS, CHARUCO, MARKERS = "chessboard", "dots", "charuco", "markers"
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class Printed:
     Attributes
     ----------
     kind : str
-        ``chessboard``, ``dots`` or ``charuco``.
+        ``chessboard``, ``dots``, ``charuco`` or ``markers``.
     shape : (columns, rows), optional
-        Inner corners, or dots; counted when not given, which no board with markers allows.
+        Inner corners, dots or markers; counted when not given, which no board with markers allows.
     dictionary : str
         Of the markers, if there are any.
     marker : float
-        Their side over that of the squares.
+        Their side over that of the squares, or over the way from one to the next.
     """
 
     kind: str = CHESSBOARD
@@ -44,6 +44,8 @@ class Printed:
         """
         if self.kind == CHARUCO:
             charuco_boards(self.shape, self.dictionary, self.marker)
+        elif self.kind == MARKERS:
+            check_grid(self.shape, self.dictionary, self.marker)
         else:
             check_shape(self.shape)
 
@@ -55,6 +57,7 @@ class Printed:
         InvalidInput
             If the image shows none.
         """
-        if self.kind == CHARUCO:
-            return charuco(image, self.shape, self.dictionary, self.marker, noise)
+        if self.kind in (CHARUCO, MARKERS):
+            look = charuco if self.kind == CHARUCO else marker_grid
+            return look(image, self.shape, self.dictionary, self.marker, noise)
         return (dot_grid if self.kind == DOTS else chessboard)(image, self.shape, noise)

@@ -41,7 +41,7 @@ def test_the_drawn_board_is_opencvs(seen, images):
     onto = onto @ np.array([[1 / side, 0, 0.5 / side - 1], [0, 1 / side, 0.5 / side - 1], [0, 0, 1]])
     warped = cv2.warpPerspective(flat, onto, rig.size, borderValue=180.0)
     smooth = [cv2.GaussianBlur(each, (0, 0), 2.0) for each in (warped, ours, np.roll(ours, 2, 1))]
-    assert np.abs(smooth[0] - smooth[1]).max() < 14  # of 140
+    assert np.abs(smooth[0] - smooth[1]).max() < 20  # of 140
     assert np.abs(smooth[0] - smooth[2]).max() > 28
 
 

@@ -25,11 +25,14 @@ class Options:
     """What a calibration is asked for."""
 
     boards: Annotated[list[Path], typer.Argument(metavar="BOARD...", help="Photographs of one board, 3 or more.")]
-    square: Annotated[float, typer.Option(metavar="LENGTH", help="Side of the board's squares; from dot to dot.")]
+    square: Annotated[
+        float,
+        typer.Option(metavar="LENGTH", help="Side of the board's squares; from dot or marker to the next."),
+    ]
     square_sd: Annotated[float, typer.Option(help="Its standard uncertainty, the same for all squares.")] = 0.0
     units: Annotated[str, typer.Option(help="Of the squares and of the poses: mm, cm, m, inch.")] = "mm"
     shape: Annotated[
-        str | None, typer.Option(metavar="9x6", help="Inner corners, or dots: columns x rows; counted when not given.")
+        str | None, typer.Option(metavar="9x6", help="Inner corners, dots or markers: columns x rows; else counted.")
     ] = None
     dots: Annotated[bool, typer.Option(help="The board is a grid of dots, not a chessboard.")] = False
     charuco: Annotated[
@@ -37,6 +40,9 @@ class Options:
         typer.Option(
             metavar="DICTIONARY", help="A ChArUco board: its markers, as DICT_5X5_100. Needs --shape, --marker."
         ),
+    ] = None
+    markers: Annotated[
+        str | None, typer.Option(metavar="DICTIONARY", help="A grid of markers, as DICT_APRILTAG_36h11.")
     ] = None
     marker: Annotated[
         float | None, typer.Option(metavar="LENGTH", help="Side of the markers, of the same unit as --square.")
@@ -62,8 +68,8 @@ class Options:
 def calibrate_camera_command(given: Options) -> None:
     """Calibrate a camera from photographs of a board, seen from different directions.
 
-    The board is a chessboard; with --dots a grid of dots; with --charuco, --marker and --shape a ChArUco board, of
-    which a part is enough.
+    The board is a chessboard; with --dots a grid of dots; with --charuco a ChArUco board, with --markers a grid of
+    markers: both need --shape and --marker, and a part of them is enough.
 
     -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
     boards do not determine the focal length.
@@ -119,20 +125,23 @@ def _printed(given: Options):
     InvalidInput
         If there is no such board.
     """
-    from measure.boards.printed import CHARUCO, CHESSBOARD, DOTS, Printed
+    from measure.boards.printed import CHARUCO, CHESSBOARD, DOTS, MARKERS, Printed
 
-    shape, dictionary = _shape(given.shape), given.charuco
+    shape, square = _shape(given.shape), given.square
+    asked = {DOTS: given.dots, CHARUCO: given.charuco, MARKERS: given.markers}
+    kinds = [kind for kind, told in asked.items() if told] or [CHESSBOARD]
+    if len(kinds) > 1:
+        raise InvalidInput(f"--dots, --charuco, --markers must be one at most, got --{' and --'.join(kinds)}")
+    dictionary = given.charuco or given.markers
     if dictionary is None:
         if given.marker is not None:
             raise InvalidInput(f"--marker must be left out of a board without markers, got {given.marker:g}")
-        return Printed(DOTS if given.dots else CHESSBOARD, shape)
-    if given.dots:
-        raise InvalidInput("--charuco must be left out of a grid of dots, got both")
+        return Printed(kinds[0], shape)
     if shape is None:
-        raise InvalidInput("--shape must be given of a board with markers, got none")
-    if given.marker is None or not 0 < given.marker < given.square:
-        raise InvalidInput(f"--marker must be more than 0 and less than --square, {given.square:g}, got {given.marker}")
-    printed = Printed(CHARUCO, shape, dictionary, given.marker / given.square)
+        raise InvalidInput(f"--shape must be given with --{kinds[0]}, got none")
+    if given.marker is None or not 0 < given.marker < square:
+        raise InvalidInput(f"--marker must be more than 0 and less than --square, {square:g}, got {given.marker}")
+    printed = Printed(kinds[0], shape, dictionary, given.marker / square)
     printed.check()
     return printed
 

@@ -1,0 +1,131 @@
+"""A grid of square markers in an image, ArUco's or AprilTags: the four corners of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+
+from imaging.boards.windows import Windows, steps, wedges
+from measure.boards.approximate import eight_bits
+from measure.boards.bend import bends_at
+from measure.boards.chessboard import Board, check_noise, check_shape, least_noise, measured
+from measure.boards.dictionaries import check_marker, read_dictionary
+from measure.photo.noise import noise_sigma
+from scenes.arrays import picture
+from scenes.errors import InvalidInput
+
+_NEAR = 0.35  # of the gap: further off it is another corner
+_CLOCKWISE = [0, 1, 3, 2]  # of OpenCV's corners of a marker, row by row
+_HALF_WINDOW = 2  # px of OpenCV's refinement
+
+
+def marker_grid(
+    image: Any, shape: tuple[int, int], dictionary: str, marker: float, noise: float | None = None
+) -> Board:
+    """Measure the corners of the markers of a grid in an image, which may show a part of it.
+
+    OpenCV reads the markers and tells roughly where their corners are. A marker's outer corner is that of its dark
+    border: the crossing of its two sides, with levels linear in place in all four quadrants of which one is dark. The
+    window ends half way to the next marker, and within the border before what is printed behind it.
+
+    Parameters
+    ----------
+    image : array_like, shape (height, width)
+        Grey levels.
+    shape : (columns, rows)
+        Markers of the whole grid.
+    dictionary : str
+        By OpenCV's name: DICT_5X5_100, DICT_APRILTAG_36h11. Markers are numbered from 0, row by row.
+    marker : float
+        Side of a marker over the way from one to the next.
+    noise : float, optional
+        Standard deviation of white noise, grey levels; from the image when not given.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such grid in the image, or an argument is bad.
+    """
+    image = picture(image)
+    check_noise(noise)
+    known = check_grid(shape, dictionary, marker)
+    columns, rows = shape
+    grid = np.full((rows * columns, 4, 2), np.nan)
+    for number, corners in _seen(eight_bits(image), known):
+        if number < len(grid):
+            grid[number] = corners[_CLOCKWISE]
+    if not np.isfinite(grid).any():
+        raise InvalidInput(f"image must show a grid of {columns} x {rows} markers of {dictionary}, got none of them")
+    noise = max(noise_sigma(image) if noise is None else float(noise), least_noise(image))
+    layout = Markers(float(marker), known.markerSize + 2, columns, rows)
+    return replace(measured(image, grid.reshape(rows, columns, 2, 2, 2), noise, layout), marker=float(marker))
+
+
+def check_grid(shape: Any, dictionary: Any, marker: Any) -> cv2.aruco.Dictionary:
+    """The dictionary of a grid, if there is such a one.
+
+    Raises
+    ------
+    InvalidInput
+        If not.
+    """
+    if shape is None:
+        raise InvalidInput("shape must be columns and rows of markers, got none")
+    columns, rows = check_shape(shape)
+    check_marker(marker)
+    return read_dictionary(dictionary, columns * rows)
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Corners of markers beside one another: a grid (rows, columns, 2, 2, 2).
+
+    Attributes
+    ----------
+    side : float
+        Of a marker, over the way from one to the next.
+    cells : int
+        Along a side, with the border's.
+    columns, rows : int
+    """
+
+    side: float
+    cells: int
+    columns: int
+    rows: int
+
+    @property
+    def gap(self) -> float:
+        """Between markers, in their sides."""
+        return (1 - self.side) / self.side
+
+    @property
+    def near(self) -> float:
+        """Share of a side: further off it is another corner."""
+        return _NEAR * min(self.gap, 1.0)
+
+    def steps(self, grid: np.ndarray) -> np.ndarray:
+        """Along the marker's sides."""
+        return np.array([steps(quad) for quad in grid.reshape(-1, 2, 2, 2)]).reshape(-1, 2, 2)
+
+    def windows(self, image: np.ndarray, grid: np.ndarray, blur: float) -> Windows:
+        """Up to the next marker, and to what is printed within."""
+        return wedges(image, grid.reshape(-1, 2, 2, 2), self.gap, 1 / self.cells, blur)
+
+    def bends(self, grid: np.ndarray) -> np.ndarray:
+        """Told by all corners together."""
+        first = np.stack(np.meshgrid(np.arange(self.columns), np.arange(self.rows)), -1).reshape(-1, 1, 2)
+        corner = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+        return bends_at((first + self.side * corner).reshape(-1, 2), grid.reshape(-1, 2), self.steps(grid))
+
+
+def _seen(grey: np.ndarray, known: cv2.aruco.Dictionary) -> list[tuple[int, np.ndarray]]:
+    """Numbers and corners (4, 2), clockwise, of the markers in an image."""
+    how = cv2.aruco.DetectorParameters()
+    how.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    how.cornerRefinementWinSize = _HALF_WINDOW
+    corners, numbers, _ = cv2.aruco.ArucoDetector(known, how).detectMarkers(grey)
+    return [] if numbers is None else list(zip(map(int, numbers.ravel()), (each[0] for each in corners), strict=True))
