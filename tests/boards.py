@@ -33,8 +33,17 @@ class Rig:
     def corners(self, pose: np.ndarray) -> np.ndarray:
         """True images of the inner corners, (n, 2) px, for a pose of six numbers."""
         columns, rows = self.board
-        places = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2) * self.square
-        places = np.column_stack([places, np.zeros(len(places))])
+        return self.seen(pose, np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2))
+
+    def marker_corners(self, pose: np.ndarray, share: float) -> np.ndarray:
+        """True images of the corners of columns x rows markers, four of each, row by row, (n, 2) px."""
+        columns, rows = self.board
+        first = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 1, 2)
+        return self.seen(pose, (first + share * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])).reshape(-1, 2))
+
+    def seen(self, pose: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Images of places on the board, in squares, (n, 2) px."""
+        places = np.column_stack([places * self.square, np.zeros(len(places))])
         image = cv2.projectPoints(places, pose[:3], pose[3:], self.matrix, np.array(self.distortion))[0]
         return image.reshape(-1, 2)
 
