@@ -128,11 +128,11 @@ def _printed(given: Options):
     from measure.boards.printed import CHARUCO, CHESSBOARD, DOTS, MARKERS, Printed
 
     shape, square = _shape(given.shape), given.square
-    asked = {DOTS: given.dots, CHARUCO: given.charuco, MARKERS: given.markers}
-    kinds = [kind for kind, told in asked.items() if told] or [CHESSBOARD]
+    asked = {DOTS: given.dots or None, CHARUCO: given.charuco, MARKERS: given.markers}
+    kinds = [kind for kind, told in asked.items() if told is not None] or [CHESSBOARD]
     if len(kinds) > 1:
         raise InvalidInput(f"--dots, --charuco, --markers must be one at most, got --{' and --'.join(kinds)}")
-    dictionary = given.charuco or given.markers
+    dictionary = given.markers if given.charuco is None else given.charuco
     if dictionary is None:
         if given.marker is not None:
             raise InvalidInput(f"--marker must be left out of a board without markers, got {given.marker:g}")
