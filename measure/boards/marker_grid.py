@@ -19,6 +19,7 @@ from scenes.errors import InvalidInput
 
 _NEAR = 0.35  # of the gap: further off it is another corner
 _CLOCKWISE = [0, 1, 3, 2]  # of OpenCV's corners of a marker, row by row
+_ASTRAY = 0.5  # of a side: further from where the others say a marker is another one, or none
 _HALF_WINDOW = 2  # px of OpenCV's refinement
 
 
@@ -53,15 +54,12 @@ def marker_grid(
     check_noise(noise)
     known = check_grid(shape, dictionary, marker)
     columns, rows = shape
-    grid = np.full((rows * columns, 4, 2), np.nan)
-    for number, corners in _seen(eight_bits(image), known):
-        if number < len(grid):
-            grid[number] = corners[_CLOCKWISE]
+    layout = Markers(float(marker), known.markerSize + 2, columns, rows)
+    grid = layout.sorted(_seen(eight_bits(image), known))
     if not np.isfinite(grid).any():
         raise InvalidInput(f"image must show a grid of {columns} x {rows} markers of {dictionary}, got none of them")
     noise = max(noise_sigma(image) if noise is None else float(noise), least_noise(image))
-    layout = Markers(float(marker), known.markerSize + 2, columns, rows)
-    return replace(measured(image, grid.reshape(rows, columns, 2, 2, 2), noise, layout), marker=float(marker))
+    return replace(measured(image, grid, noise, layout), marker=float(marker))
 
 
 def check_grid(shape: Any, dictionary: Any, marker: Any) -> cv2.aruco.Dictionary:
@@ -98,6 +96,33 @@ class Markers:
     rows: int
 
     @property
+    def places(self) -> np.ndarray:
+        """Of the markers' corners on the board, in ways from one marker to the next, shape (n, 4, 2)."""
+        first = np.stack(np.meshgrid(np.arange(self.columns), np.arange(self.rows)), -1).reshape(-1, 1, 2)
+        return first + self.side * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+
+    def sorted(self, seen: list[tuple[int, np.ndarray]]) -> np.ndarray:
+        """The grid of markers that are seen, (number, corners (4, 2), clockwise) each; NaN where none is.
+
+        A number that is read twice, and a marker that lies where a plane board cannot have it, are no part of it.
+        """
+        numbers = [number for number, _ in seen]
+        grid = np.full((self.rows * self.columns, 4, 2), np.nan)
+        for number, corners in seen:
+            if number < len(grid) and numbers.count(number) == 1:
+                grid[number] = corners[_CLOCKWISE]
+        there = np.isfinite(grid).all((1, 2))
+        if there.sum() > 1:
+            limit = _ASTRAY * float(np.median(np.linalg.norm(grid[there, 1] - grid[there, 0], axis=-1)))
+            matrix = cv2.findHomography(
+                self.places[there].reshape(-1, 2), grid[there].reshape(-1, 2), cv2.RANSAC, limit
+            )[0]
+            if matrix is not None:
+                off = cv2.perspectiveTransform(self.places.reshape(1, -1, 2), matrix).reshape(grid.shape) - grid
+                grid[~(np.linalg.norm(off, axis=-1) < limit).all(1)] = np.nan
+        return grid.reshape(self.rows, self.columns, 2, 2, 2)
+
+    @property
     def gap(self) -> float:
         """Between markers, in their sides."""
         return (1 - self.side) / self.side
@@ -117,9 +142,7 @@ class Markers:
 
     def bends(self, grid: np.ndarray) -> np.ndarray:
         """Told by all corners together."""
-        first = np.stack(np.meshgrid(np.arange(self.columns), np.arange(self.rows)), -1).reshape(-1, 1, 2)
-        corner = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
-        return bends_at((first + self.side * corner).reshape(-1, 2), grid.reshape(-1, 2), self.steps(grid))
+        return bends_at(self.places.reshape(-1, 2), grid.reshape(-1, 2), self.steps(grid))
 
 
 def _seen(grey: np.ndarray, known: cv2.aruco.Dictionary) -> list[tuple[int, np.ndarray]]:

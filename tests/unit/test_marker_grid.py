@@ -10,6 +10,7 @@ from scipy import stats
 
 import measure
 from imaging.boards.windows import wedges
+from measure.boards.marker_grid import Markers
 from measure.boards.printed import MARKERS, Printed
 from scenes import InvalidInput
 from tests.boards import SMALL, poses
@@ -67,6 +68,17 @@ def test_places_on_the_board(grids):
     places = grids[0].places.reshape(3, 4, 2, 2, 2)
     assert places[0, 0].tolist() == [[[0, 0], [SHARE, 0]], [[0, SHARE], [SHARE, SHARE]]]
     assert places[2, 3, 1, 0].tolist() == [3, 2 + SHARE]
+
+
+def test_markers_that_are_none_of_the_board_are_left_out(seen):
+    """One read far off, one read twice, one of a number that the board has not."""
+    layout = Markers(SHARE, 8, 4, 3)
+    truth = RIG.marker_corners(seen[0], SHARE).reshape(-1, 4, 2)
+    read = [(number, four[[0, 1, 3, 2]]) for number, four in enumerate(truth)]
+    assert layout.sorted(read).reshape(-1, 4, 2) == pytest.approx(truth)
+    read[5] = (5, read[5][1] + [60.0, 9.0])
+    grid = layout.sorted([*read, (7, read[0][1]), (12, read[0][1])]).reshape(-1, 4, 2)
+    assert [n for n, four in enumerate(grid) if np.isnan(four).any()] == [5, 7]
 
 
 def test_windows_keep_clear_of_what_is_printed():
