@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 
 from imaging.boards.windows import Marked
-from measure.boards.approximate import eight_bits
 from measure.boards.chessboard import Board, Squares, check_noise, check_shape, least_noise, measured
-from measure.boards.dictionaries import check_marker, read_dictionary
+from measure.boards.reading import Legible
 from measure.photo.noise import noise_sigma
 from scenes.arrays import picture
 from scenes.errors import InvalidInput
+from scenes.markers import read_dictionary
 
 _FEWEST = 4  # corners
 
@@ -77,23 +77,38 @@ def charuco_boards(shape: Any, dictionary: Any, marker: Any) -> tuple[cv2.aruco.
     return board, older
 
 
+def check_marker(marker: Any) -> None:
+    """See that a marker's side over its square's is a number between.
+
+    Raises
+    ------
+    InvalidInput
+        If not.
+    """
+    number = isinstance(marker, int | float | np.number) and not isinstance(marker, bool)
+    if not (number and 0 < marker < 1):
+        raise InvalidInput(f"marker must be a number more than 0 and less than 1, got {marker!r}")
+
+
 def _approximate(image: np.ndarray, boards: tuple[cv2.aruco.CharucoBoard, ...]) -> tuple[np.ndarray | None, bool]:
     """Corners (rows, columns, 2) to some tenths of a pixel, NaN where not seen; whether the first square has a marker.
 
     None if too few are seen.
     """
-    grey = eight_bits(image)
-    found = [_seen(grey, board) for board in boards]
+    legible = Legible.of(image)
+    found = [_seen(legible, board) for board in boards]
     best = max(found, key=lambda each: np.isfinite(each[..., 0]).sum())
     if np.isfinite(best[..., 0]).sum() < _FEWEST:
         return None, False
     return best, best is not found[0]
 
 
-def _seen(grey: np.ndarray, board: cv2.aruco.CharucoBoard) -> np.ndarray:
+def _seen(legible: Legible, board: cv2.aruco.CharucoBoard) -> np.ndarray:
     columns, rows = (n - 1 for n in board.getChessboardSize())
     grid = np.full((rows * columns, 2), np.nan)
-    corners, numbers, _, _ = cv2.aruco.CharucoDetector(board).detectBoard(grey)
+    reader = cv2.aruco.CharucoDetector(board)
+    reader.setDetectorParameters(legible.parameters)
+    corners, numbers, _, _ = reader.detectBoard(legible.grey)
     if numbers is not None and len(numbers):
-        grid[numbers.ravel()] = corners.reshape(-1, 2)
+        grid[numbers.ravel()] = legible.back(corners.reshape(-1, 2))
     return grid.reshape(rows, columns, 2)

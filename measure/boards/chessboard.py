@@ -218,19 +218,19 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float, layout: Layout =
     return _named(_board((columns, rows), room, fitted, noise, _clipped(image, some)), seen)
 
 
-def respond(image: np.ndarray, board: Board, grid: np.ndarray) -> sparse.csr_array:
+def respond(image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = Squares()) -> sparse.csr_array:
     """Derivatives of all coordinates x, y, x, ... of a board's corners by the image's pixels, (2 n, height * width).
 
     ``grid``, shape (rows, columns, 2), px, says about where corners are that are not measured; their rows are empty.
     """
     n = len(board.corners)
     grid = np.where(np.isfinite(board.corners), board.corners, grid.reshape(n, 2)).reshape(grid.shape)
-    found = windows(image, grid)
+    found = layout.windows(image, grid, board.blur_px)
     which = np.flatnonzero(found.room & board.measured)
     if not which.size:
         return sparse.csr_array((2 * n, image.size))
-    some, bend = found.some(which), bends(grid).reshape(-1, 2)[which]
-    rows = crossing_rows(some, fit_crossings(some, _start(grid)[which], bend, _FINE).shape, bend)
+    some, bend = found.some(which), layout.bends(grid)[which]
+    rows = crossing_rows(some, fit_crossings(some, _started(grid, layout.steps(grid))[which], bend, _FINE).shape, bend)
     x, y = np.where(some.there[..., None], some.places, 0).astype(int).transpose(2, 0, 1)
     column = np.broadcast_to((y * image.shape[1] + x)[:, None], rows.shape)
     row = np.broadcast_to((2 * which[:, None] + [0, 1])[..., None], rows.shape)

@@ -9,18 +9,18 @@ import cv2
 import numpy as np
 
 from imaging.boards.windows import Windows, steps, wedges
-from measure.boards.approximate import eight_bits
 from measure.boards.bend import bends_at
+from measure.boards.charuco import check_marker
 from measure.boards.chessboard import Board, check_noise, check_shape, least_noise, measured
-from measure.boards.dictionaries import check_marker, read_dictionary
+from measure.boards.reading import Legible
 from measure.photo.noise import noise_sigma
 from scenes.arrays import picture
 from scenes.errors import InvalidInput
+from scenes.markers import read_dictionary
 
 _NEAR = 0.35  # of the gap: further off it is another corner
 _CLOCKWISE = [0, 1, 3, 2]  # of OpenCV's corners of a marker, row by row
 _ASTRAY = 0.5  # of a side: further from where the others say a marker is another one, or none
-_HALF_WINDOW = 2  # px of OpenCV's refinement
 
 
 def marker_grid(
@@ -55,7 +55,7 @@ def marker_grid(
     known = check_grid(shape, dictionary, marker)
     columns, rows = shape
     layout = Markers(float(marker), known.markerSize + 2, columns, rows)
-    grid = layout.sorted(_seen(eight_bits(image), known))
+    grid = layout.sorted(_seen(Legible.of(image), known))
     if not np.isfinite(grid).any():
         raise InvalidInput(f"image must show a grid of {columns} x {rows} markers of {dictionary}, got none of them")
     noise = max(noise_sigma(image) if noise is None else float(noise), least_noise(image))
@@ -145,10 +145,10 @@ class Markers:
         return bends_at(self.places.reshape(-1, 2), grid.reshape(-1, 2), self.steps(grid))
 
 
-def _seen(grey: np.ndarray, known: cv2.aruco.Dictionary) -> list[tuple[int, np.ndarray]]:
+def _seen(legible: Legible, known: cv2.aruco.Dictionary) -> list[tuple[int, np.ndarray]]:
     """Numbers and corners (4, 2), clockwise, of the markers in an image."""
-    how = cv2.aruco.DetectorParameters()
-    how.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    how.cornerRefinementWinSize = _HALF_WINDOW
-    corners, numbers, _ = cv2.aruco.ArucoDetector(known, how).detectMarkers(grey)
-    return [] if numbers is None else list(zip(map(int, numbers.ravel()), (each[0] for each in corners), strict=True))
+    legible.parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
+    corners, numbers, _ = cv2.aruco.ArucoDetector(known, legible.parameters).detectMarkers(legible.grey)
+    if numbers is None:
+        return []
+    return [(int(number), legible.back(four[0])) for number, four in zip(numbers.ravel(), corners, strict=True)]

@@ -104,7 +104,7 @@ def test_a_board_seen_in_part(seen, images):
     cv2.circle(image, (round(x), round(y)), 14, 90.0, -1)
     covered = measure.charuco(image, RIG.board, NAME, SHARE, NOISE)
     assert not covered.measured[7]
-    assert 8 <= covered.measured.sum() < 20
+    assert 4 <= covered.measured.sum() < 20
 
 
 def test_a_board_that_begins_with_a_marker(seen):

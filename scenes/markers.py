@@ -1,26 +1,14 @@
-"""Dictionaries of square markers, ArUco's and AprilTag's, by OpenCV's names."""
+"""Square markers, ArUco's and AprilTag's: dictionaries by OpenCV's names, and the cells of each."""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import cv2
 import numpy as np
 
 from scenes.errors import InvalidInput
-
-
-def check_marker(marker: Any) -> None:
-    """See that a marker's side over its square's is a number between.
-
-    Raises
-    ------
-    InvalidInput
-        If not.
-    """
-    number = isinstance(marker, int | float | np.number) and not isinstance(marker, bool)
-    if not (number and 0 < marker < 1):
-        raise InvalidInput(f"marker must be a number more than 0 and less than 1, got {marker!r}")
 
 
 def read_dictionary(name: Any, needed: int) -> cv2.aruco.Dictionary:
@@ -40,3 +28,16 @@ def read_dictionary(name: Any, needed: int) -> cv2.aruco.Dictionary:
             f"dictionary must have the board's {needed} markers, got {name}, which has {len(found.bytesList)}"
         )
     return found
+
+
+@lru_cache(maxsize=16)
+def bright_cells(name: str, count: int) -> np.ndarray:
+    """Which cells of the first markers of a dictionary are bright, bool (count, cells, cells), row by row from the top;
+    the outer ones, the border, are dark.
+
+    >>> bright_cells("DICT_4X4_50", 2).shape
+    (2, 6, 6)
+    """
+    dictionary = read_dictionary(name, count)
+    cells = dictionary.markerSize + 2
+    return np.array([cv2.aruco.generateImageMarker(dictionary, n, cells) > 0 for n in range(count)])
