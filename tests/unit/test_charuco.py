@@ -52,12 +52,12 @@ def test_without_noise_corners_are_where_they_are(seen, images):
 
 
 def test_covariance_is_that_of_the_corners(seen, images):
-    """Chi-square of 4 boards in 3 draws; 1.3 times the covariance, and windows that reach into the markers, are
+    """Chi-square of 4 boards in 2 draws; 1.5 times the covariance, and windows that reach into the markers, are
     rejected."""
     rng, total, rows = np.random.default_rng(5), 0.0, 0
     for image, pose in zip(images, seen, strict=True):
         truth = RIG.corners(pose)
-        for _ in range(3):
+        for _ in range(2):
             noisy = image + rng.normal(0, NOISE, image.shape)
             clear = measure.charuco(noisy, RIG.board, NAME, SHARE, NOISE)
             good = clear.measured
@@ -69,9 +69,9 @@ def test_covariance_is_that_of_the_corners(seen, images):
         plain = measured(noisy, truth.reshape(4, 5, 2), NOISE)
         assert plain.status.count("misfit") > 10
     low, high = stats.chi2.ppf([0.005, 0.995], rows)
-    assert low < total < high  # margin: chance, 99 %; 12 seeded pictures
-    assert not low < total / 1.3 < high  # margin: 1.3 lies beyond 99 %; 12 seeded pictures
-    assert not low < total * 1.3 < high  # margin: 1.3 lies beyond 99 %; 12 seeded pictures
+    assert low < total < high  # margin: chance, 99 %; 8 seeded pictures
+    assert not low < total / 1.5 < high  # margin: 1.5 lies beyond 99 %; 8 seeded pictures
+    assert not low < total * 1.5 < high  # margin: 1.5 lies beyond 99 %; 8 seeded pictures
 
 
 def test_windows_keep_clear_of_markers():
