@@ -6,8 +6,10 @@ ice_vision.check(__file__, "scenes", "imaging")
 
 from measure.best import best_estimator
 from measure.boards.camera import CameraCalibration, calibrate_camera
+from measure.boards.charuco import charuco
 from measure.boards.chessboard import Board, chessboard
 from measure.boards.dots import dot_grid
+from measure.boards.marker_grid import marker_grid
 from measure.bounds import bound
 from measure.correction import Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
@@ -61,6 +63,7 @@ __all__ = [
     "blurred_sides",
     "bound",
     "calibrate_camera",
+    "charuco",
     "chessboard",
     "corrected",
     "correction",
@@ -74,6 +77,7 @@ __all__ = [
     "fitted_field",
     "load_lens",
     "locate",
+    "marker_grid",
     "measure",
     "measure_by",
     "measure_quadrilateral",

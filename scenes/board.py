@@ -8,12 +8,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from scenes.markers import bright_cells
 from scenes.model import Model
 from scenes.ranges import Coordinate, Fraction, Length, Spread
 
 PITCH = "placement.board.pitch"
 """Key of the one number of a board that may carry an uncertainty."""
 Vector = tuple[Coordinate, Coordinate, Coordinate]
+_MARKER = 0.7  # of a square: a marker's side
 _SKEW = 1e-6  # cosine of the angle between the directions that a board may have
 AROUND = 32  # sides of the polygon that stands for a dot in images; its area is the circle's
 _ROUNDED = np.sqrt(2 * np.pi / AROUND / np.sin(2 * np.pi / AROUND))  # of its radius, which makes the area the circle's
@@ -22,10 +24,12 @@ _ROUNDED = np.sqrt(2 * np.pi / AROUND / np.sin(2 * np.pi / AROUND))  # of its ra
 class Board(Model):
     """A plane with a chessboard's squares or a grid of dots, rigidly beside the part.
 
-    Its points are the chessboard's inner corners, or the middles of the dots: row by row from ``corner``.
+    Its points are the chessboard's inner corners, or the middles of the dots: row by row from ``corner``. A ChArUco
+    board is a chessboard with markers in its bright squares; upright, with ``along`` to the right, ``corner`` is at
+    its lower left.
     """
 
-    kind: Literal["chessboard", "dots"] = "chessboard"
+    kind: Literal["chessboard", "dots", "charuco"] = "chessboard"
     """What is printed on it."""
     shape: tuple[Annotated[int, Field(ge=3, le=200)], Annotated[int, Field(ge=3, le=200)]]
     """Columns and rows of inner corners, or of dots."""
@@ -39,6 +43,10 @@ class Board(Model):
     """Towards where it is looked at from; the columns run along normal x along."""
     dot_radius: Length | None = None
     """Of dots, which are dark; a quarter of the pitch if left out [length]."""
+    dictionary: str | None = None
+    """Of a ChArUco board's markers, by OpenCV's name, as DICT_5X5_100."""
+    marker: Length | None = None
+    """Side of its markers; 0.7 of the pitch if left out [length]."""
     bright: Fraction = 0.8
     """Reflectance of what is bright: a diffuse surface."""
     dark: Fraction = 0.05
@@ -57,11 +65,32 @@ class Board(Model):
             raise ValueError(f"normal must be across along, got {list(self.normal)} and {list(self.along)}")
         if not self.dark < self.bright:
             raise ValueError(f"dark must be less than bright, {self.bright:g}, got {self.dark:g}")
-        if self.kind == "chessboard" and self.dot_radius is not None:
-            raise ValueError(f"dot_radius must be left out of a chessboard, got {self.dot_radius:g}")
+        if self.kind != "dots" and self.dot_radius is not None:
+            raise ValueError(f"dot_radius must be left out of a {self.kind}, got {self.dot_radius:g}")
         if self.kind == "dots" and not self.radius < 0.45 * self.pitch:
             raise ValueError(f"dot_radius must be less than 0.45 of pitch, {self.pitch:g}, got {self.radius:g}")
+        self._check_markers()
         return self
+
+    def _check_markers(self) -> None:
+        if self.kind != "charuco":
+            given = self.dictionary if self.marker is None else f"{self.marker:g}"
+            if given is not None:
+                raise ValueError(f"dictionary and marker must be left out of a {self.kind}, got {given}")
+            return
+        if not self.share < 1:
+            raise ValueError(f"marker must be less than pitch, {self.pitch:g}, got {self.marker:g}")
+        bright_cells(self.dictionary or "", (self.shape[0] + 1) * (self.shape[1] + 1) // 2)
+
+    @property
+    def share(self) -> float:
+        """Side of a ChArUco board's markers over that of its squares."""
+        return _MARKER if self.marker is None else self.marker / self.pitch
+
+    @property
+    def before(self) -> bool:
+        """Whether the square before its first point is bright: a ChArUco board's upper left one is dark."""
+        return self.kind == "charuco" and self.shape[1] % 2 == 1
 
     @property
     def radius(self) -> float:
@@ -96,7 +125,7 @@ class Board(Model):
     def outer(self) -> np.ndarray:
         """Places of its own corners, counterclockwise, (4, 2): a bright border a pitch wide beyond squares or dots."""
         x, y = self.shape
-        if self.kind == "chessboard":
+        if self.kind != "dots":
             return np.array([(-2.0, -2.0), (x + 1, -2), (x + 1, y + 1), (-2, y + 1)])
         return np.array([(-1.0, -1.0), (x, -1), (x, y), (-1, y)])
 
@@ -108,7 +137,10 @@ class Board(Model):
     @property
     def dark_polygons(self) -> np.ndarray:
         """Corners (m, k, 2) of what is dark, places on the board, counterclockwise; dots as polygons of the same
-        area."""
+        area. A marker's bright cells lie in its dark square, clockwise."""
+        if self.kind == "charuco":
+            squares, bright = _markers(*self.shape, self.dictionary, self.share)[:2]
+            return np.concatenate([_quads(*self.shape, int(self.before)), squares, bright[:, ::-1]])
         if self.kind == "chessboard":
             return _quads(*self.shape, 0)
         return _numbers(*self.shape)[:, None] + _polygon(self.radius / self.pitch)
@@ -117,9 +149,15 @@ class Board(Model):
     def triangles(self) -> tuple[np.ndarray, np.ndarray]:
         """Triangles (T, 3, 3) of what is bright and of what is dark, which cover it once; dots as polygons of the same
         area."""
-        made = _squares(*self.shape) if self.kind == "chessboard" else _dots(*self.shape, self.radius / self.pitch)
-        bright, dark = (self.at(part) for part in made)
+        bright, dark = (self.at(part) for part in self._made())
         return bright, dark
+
+    def _made(self) -> tuple[np.ndarray, np.ndarray]:
+        if self.kind == "dots":
+            return _dots(*self.shape, self.radius / self.pitch)
+        if self.kind == "chessboard":
+            return _squares(*self.shape)
+        return _charuco(*self.shape, int(self.before), *_markers(*self.shape, self.dictionary, self.share))
 
 
 @lru_cache(maxsize=16)
@@ -131,6 +169,33 @@ def _squares(columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (T, 3, 2) of bright and dark squares; that before the first inner corner is dark."""
     bright = np.concatenate([_quads(columns, rows, 1), _border((-2.0, columns + 1.0), (-2.0, rows + 1.0), 1.0)])
     return _halves(bright), _halves(_quads(columns, rows, 0))
+
+
+def _charuco(columns: int, rows: int, odd: int, marked, bright, dark) -> tuple[np.ndarray, np.ndarray]:
+    """The same of a board with markers: their squares, and their bright and dark cells."""
+    square = np.floor(marked[:, 0])
+    around = [
+        _border((x, x + 1.0), (y, y + 1.0), low)
+        for (x, y), low in zip(square, (marked[:, 0] - square)[:, 0], strict=True)
+    ]
+    bright = np.concatenate([bright, *around, _border((-2.0, columns + 1.0), (-2.0, rows + 1.0), 1.0)])
+    return _halves(bright), _halves(np.concatenate([_quads(columns, rows, odd), dark]))
+
+
+def _markers(columns: int, rows: int, dictionary: str, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Outlines (n, 4, 2) of a board's markers, and of their bright and dark cells; numbered from the upper left."""
+    x, y = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1))
+    there = (x + y) % 2 == 1
+    first = np.stack([x[there] - 1, rows - y[there] - 1], -1) + (1 - share) / 2
+    cells = bright_cells(dictionary, len(first))
+    side, count = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]), cells.shape[1]
+
+    def outlines(which: np.ndarray) -> np.ndarray:
+        number, row, column = np.nonzero(which)
+        at = np.stack([column, count - 1 - row], -1)[:, None] + side
+        return first[number, None] + share / count * at
+
+    return first[:, None] + share * side, outlines(cells), outlines(~cells)
 
 
 def _border(across: tuple[float, float], down: tuple[float, float], wide: float) -> np.ndarray:

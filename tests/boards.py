@@ -33,8 +33,17 @@ class Rig:
     def corners(self, pose: np.ndarray) -> np.ndarray:
         """True images of the inner corners, (n, 2) px, for a pose of six numbers."""
         columns, rows = self.board
-        places = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2) * self.square
-        places = np.column_stack([places, np.zeros(len(places))])
+        return self.seen(pose, np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2))
+
+    def marker_corners(self, pose: np.ndarray, share: float) -> np.ndarray:
+        """True images of the corners of columns x rows markers, four of each, row by row, (n, 2) px."""
+        columns, rows = self.board
+        first = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 1, 2)
+        return self.seen(pose, (first + share * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])).reshape(-1, 2))
+
+    def seen(self, pose: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Images of places on the board, in squares, (n, 2) px."""
+        places = np.column_stack([places * self.square, np.zeros(len(places))])
         image = cv2.projectPoints(places, pose[:3], pose[3:], self.matrix, np.array(self.distortion))[0]
         return image.reshape(-1, 2)
 
@@ -42,10 +51,39 @@ class Rig:
         """Noise-free grey levels: samples x samples a pixel, each an average of its own, blurred and averaged."""
         gx, gy = self._on_board(pose, samples)
         columns, rows = self.board
-        sign = _wave(gx, columns) * _wave(gy, rows)
-        inside = _step(gx + 1) * _step(columns - gx) * _step(gy + 1) * _step(rows - gy)
-        dark, bright = self.levels
-        fine = (bright - inside * (bright - dark) / 2 * (1 - sign)).astype(np.float32)
+        dark = self._squares(gx, gy, (1 - _wave(gx, columns) * _wave(gy, rows)) / 2)
+        return self._recorded(dark, samples)
+
+    def charuco(self, pose: np.ndarray, name: str, share: float, samples: int = 5, older: bool = False) -> np.ndarray:
+        """The same, with markers of a dictionary in the bright squares, their sides such a share of the squares'; the
+        first square is dark, or bright as before OpenCV 4.6."""
+        gx, gy = self._on_board(pose, samples)
+        columns, rows = self.board
+        sign = _wave(gx, columns) * _wave(gy, rows) * (1 if older else -1)
+        numbers = np.full((rows + 1, columns + 1), -1)
+        bright = np.indices(numbers.shape).sum(0) % 2 == (0 if older else 1)
+        numbers[bright] = np.arange(bright.sum())
+        printed = _markers(gx + 1, gy + 1, numbers, name, share)
+        return self._recorded(np.maximum(self._squares(gx, gy, (1 - sign) / 2), printed), samples)
+
+    def markers(self, pose: np.ndarray, name: str, share: float, samples: int = 5) -> np.ndarray:
+        """The same of columns x rows markers, whose sides are such a share of the way from one to the next; the first
+        one's first corner lies at 0, 0."""
+        gx, gy = self._on_board(pose, samples)
+        columns, rows = self.board
+        gap = (1 - share) / 2
+        numbers = np.arange(rows * columns).reshape(rows, columns)
+        return self._recorded(_markers(gx + gap, gy + gap, numbers, name, share), samples)
+
+    def _squares(self, gx: np.ndarray, gy: np.ndarray, dark: np.ndarray) -> np.ndarray:
+        """What is dark within the board, and nothing beside it."""
+        columns, rows = self.board
+        return dark * _step(gx + 1) * _step(columns - gx) * _step(gy + 1) * _step(rows - gy)
+
+    def _recorded(self, dark: np.ndarray, samples: int) -> np.ndarray:
+        """Grey levels of samples of which such a part is dark."""
+        low, high = self.levels
+        fine = (high - (high - low) * dark).astype(np.float32)
         left = np.sqrt((self.blur * samples) ** 2 - 1 / 12)  # a sample's own width taken off
         fine = cv2.GaussianBlur(fine, (0, 0), left, borderType=cv2.BORDER_REPLICATE)
         width, height = self.size
@@ -56,12 +94,7 @@ class Rig:
         gx, gy = self._on_board(pose, samples)
         columns, rows = self.board
         x, y = np.clip(np.rint(gx), 0, columns - 1), np.clip(np.rint(gy), 0, rows - 1)
-        dark, bright = self.levels
-        fine = (bright - (bright - dark) * _step(radius - np.hypot(gx - x, gy - y))).astype(np.float32)
-        left = np.sqrt((self.blur * samples) ** 2 - 1 / 12)
-        fine = cv2.GaussianBlur(fine, (0, 0), left, borderType=cv2.BORDER_REPLICATE)
-        width, height = self.size
-        return fine.reshape(height, samples, width, samples).mean((1, 3), dtype=float)
+        return self._recorded(_step(radius - np.hypot(gx - x, gy - y)), samples)
 
     def _on_board(self, pose: np.ndarray, samples: int) -> tuple[np.ndarray, np.ndarray]:
         """Place on the board, in squares, of every sample."""
@@ -91,6 +124,26 @@ def _wave(place: np.ndarray, lines: int) -> np.ndarray:
 def _step(place: np.ndarray) -> np.ndarray:
     """1 above 0, averaged over a sample."""
     return np.clip(place / np.hypot(*np.gradient(place)) + 0.5, 0, 1)
+
+
+def _markers(x: np.ndarray, y: np.ndarray, numbers: np.ndarray, name: str, share: float) -> np.ndarray:
+    """How dark the markers in the middles of squares are, averaged over a sample at their outlines; ``numbers`` (rows,
+    columns) of those in the squares from 0, 0 on, -1 where there is none."""
+    rows, columns = numbers.shape
+    column, row = (np.clip(np.floor(at).astype(int), 0, n - 1) for at, n in ((x, columns), (y, rows)))
+    u, v = (x - column - (1 - share) / 2) / share, (y - row - (1 - share) / 2) / share
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    cells = dictionary.markerSize + 2
+    bits = np.array([cv2.aruco.generateImageMarker(dictionary, int(n), cells) for n in range(numbers.max() + 1)]) > 0
+    at = (np.clip((each * cells).astype(int), 0, cells - 1) for each in (v, u))
+    number = numbers[row, column]
+    box = _within(u, np.hypot(*np.gradient(x)) / share) * _within(v, np.hypot(*np.gradient(y)) / share)
+    return box * (number >= 0) * ~bits[(number, *at)]
+
+
+def _within(place: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """1 from 0 to 1, averaged over a sample."""
+    return np.clip(np.minimum(place, 1 - place) / slope + 0.5, 0, 1)
 
 
 def poses(rig: Rig, count: int, rng: np.random.Generator, distance: float) -> list[np.ndarray]:

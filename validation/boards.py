@@ -1,4 +1,4 @@
-"""Photographs of a chessboard or a grid of dots: measured one by one, those without a board named and left out."""
+"""Photographs of a board: measured one by one, those without a board named and left out."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 import measure
 from measure.boards.camera import FEWEST_BOARDS, FEWEST_CORNERS
+from measure.boards.printed import Printed
 from scenes import InvalidInput
 from scenes.files import image as image_file
 
@@ -39,15 +40,12 @@ class Boards:
 
 def read_boards(
     files: Sequence[Path],
-    shape: tuple[int, int] | None = None,
+    printed: Printed = Printed(),
     noise: float | None = None,
     progress: Callable[[str, int, int], None] | None = None,
     size: image_file.Size | None = None,
-    *,
-    dots: bool = False,
 ) -> Boards:
-    """Measure the board in each photograph, a chessboard or a grid of dots; ``size`` is what they must have, else the
-    first one's.
+    """Measure the board in each photograph; ``size`` is what they must have, else the first one's.
 
     Raises
     ------
@@ -67,7 +65,7 @@ def read_boards(
             continue
         size = size or image_file.Size(*image.shape, of=str(path))
         try:
-            found[path] = _board(image, shape, noise, dots)
+            found[path] = _board(image, printed, noise)
         except InvalidInput as error:
             left_out.append((path, f"{path}: {error}"))
         if progress:
@@ -81,9 +79,9 @@ def read_boards(
     return Boards(tuple(found), tuple(found.values()), tuple(left_out), size[:2])
 
 
-def _board(image: np.ndarray, shape: tuple[int, int] | None, noise: float | None, dots: bool) -> measure.Board:
+def _board(image: np.ndarray, printed: Printed, noise: float | None) -> measure.Board:
     """That of one photograph, enough of whose corners can be measured."""
-    board = (measure.dot_grid if dots else measure.chessboard)(image, shape, noise)
+    board = printed.measured(image, noise)
     good = int(board.measured.sum())
     if good < FEWEST_CORNERS:
         raise InvalidInput(f"board must have {FEWEST_CORNERS} corners that can be measured, got {good}")

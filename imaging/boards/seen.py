@@ -18,8 +18,8 @@ from imaging import sensor
 from imaging.boards.dot_fitting import dot_expected, dot_reach
 from imaging.boards.fitting import crossing_rows
 from imaging.boards.saddle import response
+from imaging.boards.windows import Marked, windows
 from imaging.boards.windows import steps as ways
-from imaging.boards.windows import windows
 from imaging.features.placing import steps
 from imaging.features.seen import Seen
 from imaging.geometry.blur import blur_at
@@ -210,12 +210,22 @@ def _unit(pictures: Pictures, board: Board, places: np.ndarray) -> np.ndarray:
     found = np.empty((*grids.shape[:-3], 2, 2))
     for index in np.ndindex(*grids.shape[:-3]):
         args = grids[index], float(blur[index])
-        found[index] = crossing(*args) if board.kind == "chessboard" else dot(*args, board.radius / board.pitch)
+        if board.kind == "dots":
+            found[index] = dot(*args, board.radius / board.pitch)
+        else:
+            found[index] = crossing(*args, marked_beside(board, x + y))
     return found
 
 
-def crossing(grid: np.ndarray, blur: float) -> np.ndarray:
-    """Covariance (2, 2) of the middle one of 3 x 3 corners (3, 3, 2), px, as it is fitted, px^2.
+def marked_beside(board: Board, skipped: int = 0) -> Marked | None:
+    """What corners lie beside, from one so many columns and rows behind the first on; None without markers."""
+    if board.kind != "charuco":
+        return None
+    return Marked((1 - board.share) / 2, board.before == (skipped % 2 == 0))
+
+
+def crossing(grid: np.ndarray, blur: float, marked: Marked | None = None) -> np.ndarray:
+    """Covariance (2, 2) of the middle one of 3 x 3 corners (3, 3, 2), px, as it is fitted, px^2, maybe beside markers.
 
     For noise of variance 1 in each pixel and a contrast of 1 of bright and dark squares.
     """
@@ -223,7 +233,7 @@ def crossing(grid: np.ndarray, blur: float) -> np.ndarray:
         return np.full((2, 2), np.inf)
     around = int(_MARGIN) + 2
     here = grid - np.rint(grid[1, 1]) + around
-    window = windows(np.zeros((2 * around + 1, 2 * around + 1)), here).some(np.array([4]))
+    window = windows(np.zeros((2 * around + 1, 2 * around + 1)), here, marked, blur).some(np.array([4]))
     if not window.room[0]:
         return np.full((2, 2), np.inf)
     toward = ways(here)[1, 1]

@@ -1,1 +1,1 @@
-"""Chessboards: their corners, and the camera that saw them."""
+"""Boards: chessboards, dots and markers, and the camera that saw them."""

@@ -26,7 +26,7 @@ def approximate_corners(image: np.ndarray, shape: tuple[int, int] | None) -> np.
     shape : (columns, rows) or None
         Inner corners; None where they are to be counted.
     """
-    grey = _eight_bits(image)
+    grey = eight_bits(image)
     scale = max(1.0, max(grey.shape) / _LONGEST)
     small = grey if scale == 1 else cv2.resize(grey, None, fx=1 / scale, fy=1 / scale, interpolation=cv2.INTER_AREA)
     found = _counted(small) if shape is None else _by_sectors(small, shape)
@@ -36,7 +36,7 @@ def approximate_corners(image: np.ndarray, shape: tuple[int, int] | None) -> np.
     return (found + 0.5) * [grey.shape[1] / small.shape[1], grey.shape[0] / small.shape[0]] - 0.5
 
 
-def _eight_bits(image: np.ndarray) -> np.ndarray:
+def eight_bits(image: np.ndarray) -> np.ndarray:
     low, high = np.percentile(image, [0.1, 99.9])
     return np.clip(np.rint((image - low) * (255 / max(high - low, 1e-300))), 0, 255).astype(np.uint8)
 

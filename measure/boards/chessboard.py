@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy import sparse
 from scipy.special import chdtrc
 
 from imaging.boards.fitting import Crossings, crossing_rows, fit_crossings
-from imaging.boards.windows import steps, windows
+from imaging.boards.windows import Marked, Windows, steps, windows
 from measure.boards.approximate import approximate_corners
 from measure.boards.bend import bends
 from measure.photo.noise import noise_sigma
@@ -31,11 +31,12 @@ _MOST = 200  # corners along a side
 
 @dataclass(frozen=True, eq=False)
 class Board:
-    """A chessboard's inner corners, or the dots of a grid, in one image.
+    """A chessboard's inner corners, the dots of a grid, or the corners of its markers, in one image.
 
     Attributes
     ----------
     shape : (columns, rows)
+        Of inner corners, dots or markers.
     corners : ndarray, shape (n, 2)
         (x, y), px, (0, 0) the centre of the first pixel; row by row; NaN where not measured.
     covariance : ndarray, shape (n, 2, 2)
@@ -51,6 +52,9 @@ class Board:
         Median standard deviation of the lens blur, px.
     radius : float
         Of a grid of dots (`measure.dot_grid`) the dots' radius over the way from one to the next; 0 of a chessboard.
+    marker : float
+        Of a grid of markers (`measure.marker_grid`) their side over the way from one to the next; else 0. Each has four
+        corners, row by row.
     """
 
     shape: tuple[int, int]
@@ -61,6 +65,7 @@ class Board:
     noise: float
     blur_px: float
     radius: float = 0.0
+    marker: float = 0.0
 
     @property
     def measured(self) -> np.ndarray:
@@ -70,8 +75,14 @@ class Board:
     @property
     def places(self) -> np.ndarray:
         """Column and row of each corner on the board, shape (n, 2): to be multiplied by the squares' size."""
-        columns, rows = self.shape
-        return np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+        places = _numbered(*self.shape)
+        if not self.marker:
+            return places
+        return (places[:, None] + self.marker * _numbered(2, 2)).reshape(-1, 2)
+
+
+def _numbered(columns: int, rows: int) -> np.ndarray:
+    return np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
 
 
 def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | None = None) -> Board:
@@ -103,7 +114,7 @@ def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | 
         wanted = f"of {shape[0]} x {shape[1]} inner corners" if shape else "of at least 3 x 3 inner corners"
         raise InvalidInput(f"image must show a whole chessboard {wanted}, got none")
     noise = noise_sigma(image) if noise is None else float(noise)
-    return measured(image, grid, max(noise, _least_noise(image)))
+    return measured(image, grid, max(noise, least_noise(image)))
 
 
 def check_noise(noise: Any) -> None:
@@ -135,45 +146,91 @@ def check_shape(shape: Any) -> tuple[int, int] | None:
     return int(shape[0]), int(shape[1])
 
 
-def _least_noise(image: np.ndarray) -> float:
+def least_noise(image: np.ndarray) -> float:
     """That of rounding to whole grey levels; of numbers that are not rounded, that of the arithmetic."""
     return float(np.sqrt(1 / 12)) if (image == np.rint(image)).all() else 1e-9 * float(np.ptp(image)) + 1e-300
 
 
-def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
-    """The corners about ``grid``, shape (rows, columns, 2), px, under white noise of a standard deviation."""
+class Layout(Protocol):
+    """How a board's corners, a grid (..., 2) px, lie beside one another; NaN where one is not seen."""
+
+    @property
+    def near(self) -> float:
+        """Share of the way to the next corner: further off it is another one."""
+        ...
+
+    def steps(self, grid: np.ndarray) -> np.ndarray:
+        """Along both edges of each corner, (n, 2, 2), px."""
+        ...
+
+    def windows(self, image: np.ndarray, grid: np.ndarray, blur: float) -> Windows:
+        """Pixels that tell of each corner, through a lens of about such a blur, px."""
+        ...
+
+    def bends(self, grid: np.ndarray) -> np.ndarray:
+        """Curvature of both edges of each corner, (n, 2), 1/px."""
+        ...
+
+
+@dataclass(frozen=True)
+class Squares:
+    """Where four squares meet, maybe beside markers: a grid (rows, columns, 2)."""
+
+    marked: Marked | None = None
+    near: float = _NEAR
+
+    def steps(self, grid: np.ndarray) -> np.ndarray:
+        """To the next corner along rows and columns."""
+        return steps(grid).reshape(-1, 2, 2)
+
+    def windows(self, image: np.ndarray, grid: np.ndarray, blur: float) -> Windows:
+        """Half way to the next corners, and not into a marker."""
+        return windows(image, grid, self.marked, blur)
+
+    def bends(self, grid: np.ndarray) -> np.ndarray:
+        """Of lines of corners."""
+        return bends(grid).reshape(-1, 2)
+
+
+def measured(image: np.ndarray, grid: np.ndarray, noise: float, layout: Layout = Squares()) -> Board:
+    """The corners about ``grid``, shape (rows, columns, ..., 2), px, NaN where one is not seen, under white noise of a
+    standard deviation."""
     columns, rows = grid.shape[1::-1]
-    shape = _start(grid)
-    near = _NEAR * np.linalg.norm(steps(grid).reshape(-1, 2, 2), axis=-1).min(1)
+    toward = layout.steps(grid)
+    shape = _started(grid, toward)
+    near = layout.near * np.linalg.norm(toward, axis=-1).min(1)
+    seen, blur = np.isfinite(near), _ORDINARY
     for turn in range(_ROUNDS):
-        found = windows(image, grid)
+        found = layout.windows(image, grid, blur)
         room = found.room
         if not room.any():
-            return _nothing((columns, rows), noise)
-        some, bend = found.some(room), bends(grid).reshape(-1, 2)[room] * (turn > 0)
+            return _named(_nothing((columns, rows), noise, len(room)), seen)
+        some, bend = found.some(room), layout.bends(grid)[room] * (turn > 0)
         fitted = fit_crossings(some, shape[room], bend, _FINE if turn else _ROUGH)
         away = np.linalg.norm(fitted.shape[:, :2] - shape[room, :2], axis=1)
         fitted = replace(fitted, converged=fitted.converged & (away < near[room]))
         before, grid = grid, _moved(grid, room, fitted)
         shape[np.flatnonzero(room)[fitted.converged]] = fitted.shape[fitted.converged]
-        if turn and np.abs(grid - before).max() < _SETTLED:  # windows and bends are those of the corners as they are
+        blur = float(np.exp(np.median(fitted.shape[:, 4])))
+        moved = np.nanmax(np.abs(grid - before))
+        if turn and moved < _SETTLED:  # windows and bends are those of the corners as they are
             break
-    return _board((columns, rows), room, fitted, noise, _clipped(image, some))
+    return _named(_board((columns, rows), room, fitted, noise, _clipped(image, some)), seen)
 
 
-def respond(image: np.ndarray, board: Board, grid: np.ndarray) -> sparse.csr_array:
+def respond(image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = Squares()) -> sparse.csr_array:
     """Derivatives of all coordinates x, y, x, ... of a board's corners by the image's pixels, (2 n, height * width).
 
     ``grid``, shape (rows, columns, 2), px, says about where corners are that are not measured; their rows are empty.
     """
     n = len(board.corners)
     grid = np.where(np.isfinite(board.corners), board.corners, grid.reshape(n, 2)).reshape(grid.shape)
-    found = windows(image, grid)
+    found = layout.windows(image, grid, board.blur_px)
     which = np.flatnonzero(found.room & board.measured)
     if not which.size:
         return sparse.csr_array((2 * n, image.size))
-    some, bend = found.some(which), bends(grid).reshape(-1, 2)[which]
-    rows = crossing_rows(some, fit_crossings(some, _start(grid)[which], bend, _FINE).shape, bend)
+    some, bend = found.some(which), layout.bends(grid)[which]
+    rows = crossing_rows(some, fit_crossings(some, _started(grid, layout.steps(grid))[which], bend, _FINE).shape, bend)
     x, y = np.where(some.there[..., None], some.places, 0).astype(int).transpose(2, 0, 1)
     column = np.broadcast_to((y * image.shape[1] + x)[:, None], rows.shape)
     row = np.broadcast_to((2 * which[:, None] + [0, 1])[..., None], rows.shape)
@@ -181,17 +238,26 @@ def respond(image: np.ndarray, board: Board, grid: np.ndarray) -> sparse.csr_arr
 
 
 def _start(grid: np.ndarray) -> np.ndarray:
-    """Crossings (n, 5) to begin with: edges towards the next corners, an ordinary blur."""
-    toward = steps(grid).reshape(-1, 2, 2)
+    """Crossings (n, 5) of a chessboard to begin with."""
+    return _started(grid, steps(grid).reshape(-1, 2, 2))
+
+
+def _started(grid: np.ndarray, toward: np.ndarray) -> np.ndarray:
+    """Edges towards the next corners, an ordinary blur."""
     angles = np.arctan2(toward[..., 1], toward[..., 0])
     return np.column_stack([grid.reshape(-1, 2), angles, np.full(len(toward), np.log(_ORDINARY))])
 
 
-def _nothing(shape: tuple[int, int], noise: float) -> Board:
+def _nothing(shape: tuple[int, int], noise: float, count: int | None = None) -> Board:
     """Squares too small, or at the image's margin."""
-    n = shape[0] * shape[1]
-    nan = np.full((n, 2, 2), np.nan)
-    return Board(shape, nan[:, 0], nan, (status.SHORT,) * n, nan[:, 0, 0], noise, np.nan)
+    nan = np.full((shape[0] * shape[1] if count is None else count, 2, 2), np.nan)
+    return Board(shape, nan[:, 0], nan, (status.SHORT,) * len(nan), nan[:, 0, 0], noise, np.nan)
+
+
+def _named(board: Board, seen: np.ndarray) -> Board:
+    """The board, whose corners that are not seen, or without neighbours, are told from those without room."""
+    told = zip(board.status, seen, strict=True)
+    return replace(board, status=tuple(each if here else status.NOT_VISIBLE for each, here in told))
 
 
 def _moved(grid: np.ndarray, room: np.ndarray, fitted: Crossings) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import cv2
@@ -11,6 +10,7 @@ from scipy import sparse
 from scipy.special import chdtrc
 
 from imaging.boards.dot_fitting import dot_reach, dot_rows, fit_dots
+from imaging.boards.windows import steps
 from measure.boards.chessboard import Board, check_noise, check_shape
 from measure.photo.noise import noise_sigma
 from scenes import status
@@ -188,14 +188,6 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
 
 def _ways(grid: np.ndarray) -> np.ndarray:
     """Mean way (n,) from each dot to the next, px: the root of the area that it has; of one alone that of the grid."""
-    at = grid[..., :2]
-    with warnings.catch_warnings(action="ignore"):  # of dots without neighbours
-        down, right = (np.nanmean(_both(np.diff(at, axis=axis), axis), 0) for axis in (0, 1))
-        way = np.sqrt(np.abs(down[..., 0] * right[..., 1] - down[..., 1] * right[..., 0]))
-        return np.where(np.isfinite(way), way, np.nanmedian(way)).ravel()
-
-
-def _both(steps: np.ndarray, axis: int) -> np.ndarray:
-    """Steps (2, rows, columns, 2) to the next dot and from the last one; NaN where there is none."""
-    none = np.full_like(np.take(steps, [0], axis), np.nan)
-    return np.stack([np.concatenate([steps, none], axis), np.concatenate([none, steps], axis)])
+    right, down = np.moveaxis(steps(grid[..., :2]), 2, 0)
+    way = np.sqrt(np.abs(down[..., 0] * right[..., 1] - down[..., 1] * right[..., 0]))
+    return np.where(np.isfinite(way), way, np.nanmedian(way)).ravel()

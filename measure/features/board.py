@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 from scipy.special import chdtrc
 
-from imaging.boards.seen import SeenBoard, leaning, levels
+from imaging.boards.seen import SeenBoard, leaning, levels, marked_beside
 from imaging.boards.windows import steps as ways
 from imaging.features.placing import steps
 from imaging.geometry.blur import blur_at
@@ -22,7 +22,9 @@ from imaging.placed import combined, placed
 from imaging.sensor import recorded
 from measure.boards import chessboard, dots
 from measure.boards.chessboard import Board as MeasuredBoard
+from measure.boards.chessboard import Squares
 from measure.boards.eccentricity import centroid
+from measure.boards.printed import Printed
 from measure.goodness import WORST
 from scenes import Board, InvalidInput, Picture, status
 from scenes.placement import limits, prior
@@ -70,16 +72,24 @@ def by_board(image: np.ndarray, picture: Picture) -> tuple[np.ndarray | None, fl
     """
     board, camera = picture.scene.placement.board, picture.scene.camera
     try:
-        found = (chessboard.chessboard if board.kind == "chessboard" else dots.dot_grid)(image, board.shape)
+        found = _printed(board).measured(image)
     except InvalidInput:
         return None, 0.0
     grid = undistorted(found.corners, camera).reshape(*found.shape[::-1], 2)
     columns, rows = board.shape
     turned = [np.rot90(each, k) for each in (grid, grid[::-1]) for k in range(4)]
+    turned = [grid[::-1]] if board.kind == "charuco" else turned  # OpenCV numbers its corners from the upper left
     each = [_nearest(picture, there) for there in turned if there.shape[:2] == (rows, columns)]
     most = _BEYOND * limits(picture.scene.uncertainty) + 1e-9
     good = [(left, place) for left, place in each if left < _FAR and (np.abs(place) <= most).all()]
     return (min(good, key=lambda one: one[0])[1] if good else None), float(found.measured.mean())
+
+
+def _printed(board: Board) -> Printed:
+    """What is printed on a scene's board."""
+    if board.kind != "charuco":
+        return Printed(board.kind, board.shape)
+    return Printed(board.kind, board.shape, board.dictionary or "", board.share)
 
 
 def _nearest(picture: Picture, grid: np.ndarray) -> tuple[float, np.ndarray]:
@@ -159,13 +169,22 @@ class BoardTool:
 
     def measured(self, image: np.ndarray) -> MeasuredBoard:
         """Its points in an image."""
-        kind, grid = self._kind
-        return kind.measured(image, grid, self._noise)
+        return self._kind.measured(image, self._begun, self._noise, *self._layout)
 
     @property
-    def _kind(self) -> tuple[Any, np.ndarray]:
-        """How its points are measured, and from where."""
-        return (chessboard, self.grid) if self.board.kind == "chessboard" else (dots, self._ellipses)
+    def _kind(self) -> Any:
+        """What measures its points."""
+        return dots if self.board.kind == "dots" else chessboard
+
+    @property
+    def _begun(self) -> np.ndarray:
+        """From where they are measured."""
+        return self._ellipses if self.board.kind == "dots" else self.grid
+
+    @property
+    def _layout(self) -> tuple[Squares, ...]:
+        """What corners lie beside; nothing of dots."""
+        return () if self.board.kind == "dots" else (Squares(marked_beside(self.board)),)
 
     def points(self, found: MeasuredBoard) -> tuple[np.ndarray, np.ndarray]:
         """How far off its points are, ideal px (n, 2), and their covariance (n, 2, 2), infinite of those not found."""
@@ -189,9 +208,10 @@ class BoardTool:
     def response(self, image: np.ndarray) -> sparse.csr_array:
         """Derivatives of its parameters by the pixels of a noise-free image, (k, height * width)."""
         found = self.measured(image)
-        kind, grid = self._kind
         gain = np.einsum("kni,nij->knj", self.told.gain(self.points(found)[1]), self._back)
-        return sparse.csr_array(gain.reshape(len(gain), -1)) @ kind.respond(image, found, grid)
+        return sparse.csr_array(gain.reshape(len(gain), -1)) @ self._kind.respond(
+            image, found, self._begun, *self._layout
+        )
 
     def _fits(self, off: np.ndarray, noise: np.ndarray) -> float:
         """How often points would be left so far off their places on the board, by noise, print and pitch."""

@@ -13,7 +13,7 @@ from imaging.boards.windows import steps, windows
 from measure.boards import chessboard
 from measure.boards.adjustment import _inverse, _object
 from measure.boards.camera import CameraCalibration, _calibration, _check
-from measure.boards.chessboard import _board, _clipped, _least_noise, _nothing, _start, check_shape
+from measure.boards.chessboard import _board, _clipped, _nothing, _start, check_shape, least_noise
 from measure.boards.growing import _alternates, _alternation, _next, grown, trimmed
 from measure.boards.parameters import read_model
 from measure.photo import board_noise
@@ -206,8 +206,8 @@ def test_the_end_of_the_scale_in_a_window(end):
 
 
 def test_noise_of_next_to_none():
-    assert _least_noise(np.array([[3.0, 7.0], [9.0, 2.0]])) == pytest.approx(12**-0.5)
-    assert _least_noise(np.array([[3.0, 7.5], [9.0, 2.0]])) == pytest.approx(7e-9)
+    assert least_noise(np.array([[3.0, 7.0], [9.0, 2.0]])) == pytest.approx(12**-0.5)
+    assert least_noise(np.array([[3.0, 7.5], [9.0, 2.0]])) == pytest.approx(7e-9)
 
 
 def test_nothing_is_told_of_squares_that_are_too_small():

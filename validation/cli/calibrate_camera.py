@@ -25,13 +25,28 @@ class Options:
     """What a calibration is asked for."""
 
     boards: Annotated[list[Path], typer.Argument(metavar="BOARD...", help="Photographs of one board, 3 or more.")]
-    square: Annotated[float, typer.Option(metavar="LENGTH", help="Side of the board's squares; from dot to dot.")]
+    square: Annotated[
+        float,
+        typer.Option(metavar="LENGTH", help="Side of the board's squares; from dot or marker to the next."),
+    ]
     square_sd: Annotated[float, typer.Option(help="Its standard uncertainty, the same for all squares.")] = 0.0
     units: Annotated[str, typer.Option(help="Of the squares and of the poses: mm, cm, m, inch.")] = "mm"
     shape: Annotated[
-        str | None, typer.Option(metavar="9x6", help="Inner corners, or dots: columns x rows; counted when not given.")
+        str | None, typer.Option(metavar="9x6", help="Inner corners, dots or markers: columns x rows; else counted.")
     ] = None
     dots: Annotated[bool, typer.Option(help="The board is a grid of dots, not a chessboard.")] = False
+    charuco: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DICTIONARY", help="A ChArUco board: its markers, as DICT_5X5_100. Needs --shape, --marker."
+        ),
+    ] = None
+    markers: Annotated[
+        str | None, typer.Option(metavar="DICTIONARY", help="A grid of markers, as DICT_APRILTAG_36h11.")
+    ] = None
+    marker: Annotated[
+        float | None, typer.Option(metavar="LENGTH", help="Side of the markers, of the same unit as --square.")
+    ] = None
     model: Annotated[
         str, typer.Option(help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none.")
     ] = "k1,k2,p1,p2,k3"
@@ -51,12 +66,15 @@ class Options:
 @commands.command("calibrate-camera")
 @taking(Options)
 def calibrate_camera_command(given: Options) -> None:
-    """Calibrate a camera from photographs of a chessboard or a grid of dots, seen from different directions.
+    """Calibrate a camera from photographs of a board, seen from different directions.
+
+    The board is a chessboard; with --dots a grid of dots; with --charuco a ChArUco board, with --markers a grid of
+    markers: both need --shape and --marker, and a part of them is enough.
 
     -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
     boards do not determine the focal length.
     """
-    wanted = _checked(given)
+    printed = _checked(given)
     import measure
     from measure.boards.parameters import read_model
     from scenes import status
@@ -68,7 +86,7 @@ def calibrate_camera_command(given: Options) -> None:
     camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
         size = camera and Size(camera.height, camera.width, scene)
-        seen = read_boards(given.boards, wanted, given.noise, shown, size, dots=given.dots)
+        seen = read_boards(given.boards, printed, given.noise, shown, size)
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
     found = measure.calibrate_camera(seen.boards, given.square, seen.image_shape, given.model, given.square_sd)
@@ -84,8 +102,8 @@ def calibrate_camera_command(given: Options) -> None:
     raise typer.Exit(1 if found.status == status.ILL_CONDITIONED else 0)
 
 
-def _checked(given: Options) -> tuple[int, int] | None:
-    """See that options are in their ranges; the board's inner corners, columns and rows, if they are given."""
+def _checked(given: Options):
+    """See that options are in their ranges; what is printed on the board."""
     from scenes.units import UNITS
 
     check_number("--square", given.square, 1e-9, _LONGEST)
@@ -93,10 +111,39 @@ def _checked(given: Options) -> tuple[int, int] | None:
     check_number("--noise", given.noise, 1e-6, 1e6)
     if given.units not in UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(UNITS)}, got {given.units!r}")
-    wanted = _shape(given.shape)
+    printed = _printed(given)
     check_file("--output", given.output, ".toml")
     check_file("--residuals", given.residuals, ".png")
-    return wanted
+    return printed
+
+
+def _printed(given: Options):
+    """The board that is asked for.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no such board.
+    """
+    from measure.boards.printed import CHARUCO, CHESSBOARD, DOTS, MARKERS, Printed
+
+    shape, square = _shape(given.shape), given.square
+    asked = {DOTS: given.dots or None, CHARUCO: given.charuco, MARKERS: given.markers}
+    kinds = [kind for kind, told in asked.items() if told is not None] or [CHESSBOARD]
+    if len(kinds) > 1:
+        raise InvalidInput(f"--dots, --charuco, --markers must be one at most, got --{' and --'.join(kinds)}")
+    dictionary = given.markers if given.charuco is None else given.charuco
+    if dictionary is None:
+        if given.marker is not None:
+            raise InvalidInput(f"--marker must be left out of a board without markers, got {given.marker:g}")
+        return Printed(kinds[0], shape)
+    if shape is None:
+        raise InvalidInput(f"--shape must be given with --{kinds[0]}, got none")
+    if given.marker is None or not 0 < given.marker < square:
+        raise InvalidInput(f"--marker must be more than 0 and less than --square, {square:g}, got {given.marker}")
+    printed = Printed(kinds[0], shape, dictionary, given.marker / square)
+    printed.check()
+    return printed
 
 
 def _write_files(found, seen, output: Path | None, residuals: Path | None) -> list[Path]:

@@ -21,9 +21,9 @@ from validation.strict_json import dumps
 
 _STRONG = 0.9  # correlation that is told of
 _OF_BOARDS = (
-    "corners: columns x rows of inner corners. not ok: corners that are not used, by status. noise: grey levels. rms: "
-    "distance of corners from where the calibrated camera sees them. distance: from the camera to the board's first "
-    "corner, +- 1 sigma."
+    "corners: columns x rows of inner corners, dots or markers. not ok: corners that are not used, by status. noise: "
+    "grey levels. rms: distance of corners from where the calibrated camera sees them. distance: from the camera to "
+    "the board's first corner, +- 1 sigma."
 )
 _OF_CAMERA = (
     "fx, fy: focal lengths (fx alone: of both axes). cx, cy: where the optical axis meets the image. k1, k2, p1, p2, "

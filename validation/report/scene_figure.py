@@ -145,7 +145,9 @@ def _board(axis, view: _View, board: Board) -> None:
         dark = board.dark_polygons
         corners = view.image(board.at(dark.reshape(-1, 2))).reshape(dark.shape)
         axis.add_collection(PolyCollection([view.image(board.outline)], facecolors="0.9", edgecolors="0.5"))
-        axis.add_collection(PolyCollection(corners, facecolors="0.3"))
+        along = np.diff(dark[:, :3], axis=1)
+        bright = along[:, 0, 0] * along[:, 1, 1] < along[:, 0, 1] * along[:, 1, 0]  # clockwise: cells of a marker
+        axis.add_collection(PolyCollection(corners, facecolors=np.where(bright, "0.9", "0.3").tolist()))
 
 
 def _edge(axis, view: _View, edge: Edge) -> None:

@@ -78,6 +78,7 @@ _COMMANDS: dict[str, tuple[list[str], dict[str, tuple[str, ...]]]] = {
     "new": (["FILE"], {"--units": ("mm", "ell"), "-o": ("OUT.toml", "FILE/x.toml"), "--json": ()}),
     "calibrate-camera": (["IMAGE", "IMAGE", "FILE", "--square", "25"], {
         "--square": ("1e-9", "1e9"), "--square-sd": ("0.1",), "--units": ("cm", "ell"), "--shape": ("9x6", "2x2", "x"),
+        "--charuco": ("DICT_4X4_50", "x"), "--markers": ("DICT_APRILTAG_36h11",), "--marker": ("9", "26", "nan"),
         "--model": ("none", "f,k1", "k4"), "--noise": ("1",), "-o": ("OUT.toml", "OUT.png"), "--scene": ("SCENE",),
         "--residuals": ("OUT.png", "FILE/x.png"), "--json": (),
     }),

@@ -286,7 +286,7 @@ def _board_picture():
 
 def _grown_boards():
     clean = _board_picture()
-    grey = approximate._eight_bits(clean)
+    grey = approximate.eight_bits(clean)
     whole = approximate.approximate_corners(clean, None)
     part = whole[1:4, 1:5]
     over = np.concatenate([whole, 2 * whole[-1:] - whole[-2:-1]])

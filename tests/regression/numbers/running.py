@@ -18,6 +18,7 @@ import numpy as np
 from rich.console import Console
 
 import render
+from measure.boards.printed import Printed
 from measure.photo.photograph import photograph as shapes
 from render import EffectTolerance, Quality
 from scenes import InvalidInput
@@ -621,12 +622,12 @@ def _boards():
             np.save(f"{number}.npy", rig.image(pose, 3) + rng.normal(0, 1.0, (150, 200)))
         np.save("none.npy", rng.normal(90, 1.0, (150, 200)))
         np.save("small.npy", rng.normal(90, 1.0, (100, 200)))
-        names, reports = [Path(f"{number}.npy") for number in range(3)], []
+        names, reports, printed = [Path(f"{number}.npy") for number in range(3)], [], Printed(shape=(4, 3))
         asked = {
-            "all": ([*names, Path("none.npy"), Path("absent.npy")], (4, 3), 1.0, lambda *about: reports.append(about)),
-            "few": (names[:2], None, None),
-            "two": ([*names[:2], Path("none.npy")], (4, 3), 1.0),
-            "other": ([*names[:2], Path("small.npy")], (4, 3), 1.0),
+            "all": ([*names, Path("none.npy"), Path("absent.npy")], printed, 1.0, lambda *about: reports.append(about)),
+            "few": (names[:2],),
+            "two": ([*names[:2], Path("none.npy")], printed, 1.0),
+            "other": ([*names[:2], Path("small.npy")], printed, 1.0),
         }
         found = {name: refused(lambda how=how: boards.read_boards(*how)) for name, how in asked.items()}
     every = found.pop("all")
