@@ -137,10 +137,16 @@ class Candidate:
 def candidates(searches: Sequence[Searched], count: int = 10) -> tuple[Candidate, ...]:
     """The best settings whose sensors or lights differ by 15 degrees, over all sets of required edges.
 
-    None of more than four times the least variance of a search, nor any that a close look finds not to measure.
+    None that a close look finds not to measure, nor any of more than four times the least variance of a search, unless
+    of the others none measures.
     """
     rows = sorted((row for each in searches for row in each.rows(count)), key=lambda row: row[0])
-    rows = [row for row in rows if row[0] <= DEAREST * rows[0][0]]
+    near = [row for row in rows if row[0] <= DEAREST * rows[0][0]]
+    return _looked_at(near, count) or _looked_at(rows[len(near) :], count)
+
+
+def _looked_at(rows: Sequence[tuple[float, Searched, np.ndarray, np.ndarray]], count: int) -> tuple[Candidate, ...]:
+    """Those that differ and measure by a close look, the best first."""
     chosen = distinct(rows, _differ, 2 * count)
     made = [_candidate(searched, sensor, light) for _, searched, sensor, light in chosen]
     return tuple(sorted((c for c in made if np.isfinite(c.variance)), key=lambda c: c.variance)[:count])

@@ -43,6 +43,17 @@ def test_what_is_four_times_as_dear_is_not_looked_at():
     assert [tuple(each.sensor) for each in candidates.candidates([made], 3)] == [POLES[1], POLES[0]]
 
 
+def test_where_a_close_look_refuses_the_best_the_others_are_looked_at(monkeypatch):
+    def seen(_, sensor, light):
+        return SimpleNamespace(variance=np.inf if sensor[0] != POLES[2][0] else 1.0, sensor=sensor)
+
+    monkeypatch.setattr(candidates, "_candidate", seen)
+    rows = [(value, None, np.array(pose), np.zeros(2)) for value, pose in zip((1.0, 3.9, 4.1), POLES, strict=False)]
+    made = SimpleNamespace(problem=None)
+    made.rows = lambda count: [(value, made, *pair) for value, _, *pair in rows]
+    assert [tuple(each.sensor) for each in candidates.candidates([made], 3)] == [POLES[2]]
+
+
 def test_what_does_not_measure_when_it_is_looked_at_closely_is_not_named(monkeypatch):
     def seen(_, sensor, light):
         return SimpleNamespace(variance=np.inf if sensor[0] == POLES[0][0] else 1.0, sensor=sensor)

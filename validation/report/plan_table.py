@@ -170,9 +170,10 @@ def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     if several:
         names = ("limited by", _minimised(found, units))
     table = _table("\nClearly different settings, the best first", "", "sensor", "light", "edges", *names, "over best")
-    first = found.candidates[0]
-    itself = [*map(_pose, (first.sensor, first.light))] == [*map(_pose, (best.sensor, best.light))]
-    for c in (best, *found.candidates[itself:]):
+    others = [
+        c for c in found.candidates if (_pose(c.sensor), _pose(c.light)) != (_pose(best.sensor), _pose(best.light))
+    ]
+    for c in (best, *others):
         if several:
             values = c.limiting, f"{c.variance:.4g}"
         else:
