@@ -170,9 +170,7 @@ def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
     if several:
         names = ("limited by", _minimised(found, units))
     table = _table("\nClearly different settings, the best first", "", "sensor", "light", "edges", *names, "over best")
-    others = [
-        c for c in found.candidates if (_pose(c.sensor), _pose(c.light)) != (_pose(best.sensor), _pose(best.light))
-    ]
+    others = [c for c in found.candidates if _setting(c) != _setting(best)]
     for c in (best, *others):
         if several:
             values = c.limiting, f"{c.variance:.4g}"
@@ -181,6 +179,11 @@ def _candidates(found: planner.Plan, units: tuple[str, str]) -> Table:
         row = "best" if c is best else "", _pose(c.sensor), _pose(c.light), " ".join(c.edges)
         table.add_row(*row, *values, f"{c.variance / best.variance:.3f}")
     return table
+
+
+def _setting(c: Candidate) -> tuple[str, str, tuple[str, ...]]:
+    """What a row names."""
+    return _pose(c.sensor), _pose(c.light), c.edges
 
 
 def _as_candidate(found: planner.Plan) -> Candidate:
