@@ -12,6 +12,8 @@ from measure import FramePair, photon_transfer
 from planner.search.exhaustive import has_bound
 from render import expose
 from scenes import InvalidInput, Noise, Picture
+from scenes.cameras.binning import binned
+from validation.recipe.export import check
 
 STRAIGHT = {"sigma": 2.0, "gain": 0.09, "bits": 8, "dark_level": 16.0}
 IN_PARTS = STRAIGHT | {"gain": 0.05, "excess": [[0, 0], [60, 2.4], [1000, 40]]}  # the same line
@@ -89,3 +91,12 @@ def test_what_does_not_know_it_says_so():
     ):
         with pytest.raises(InvalidInput, match=message):
             scene.with_(noise=STRAIGHT | {"gain": 0.1} | said)
+
+
+def test_recipes_and_binning_refuse_it():
+    scene = scenes.load("task1").with_(noise=IN_PARTS)
+    with pytest.raises(InvalidInput, match=r"a linear sensor's for a recipe, got noise\.excess of 3 rows"):
+        check(Picture.of(scene, (35, 60), (20, 200)), "gradient")
+    camera = {"binning": {"factor": 2, "kind": "charge"}, "pixel_pitch_um": 3.45}
+    with pytest.raises(ValueError, match=r"camera\.binning must be left out with noise\.excess, got charge"):
+        binned({"camera": camera, "noise": IN_PARTS})
