@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from scenes.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import cv2
 
 
 def read_dictionary(name: Any, needed: int) -> cv2.aruco.Dictionary:
@@ -19,6 +21,8 @@ def read_dictionary(name: Any, needed: int) -> cv2.aruco.Dictionary:
     InvalidInput
         If there is none.
     """
+    import cv2  # slow to load, and rarely needed
+
     known = sorted(each for each in dir(cv2.aruco) if each.startswith("DICT_"))
     if name not in known:
         raise InvalidInput(f"dictionary must be one of {', '.join(known)}, got {str(name)[:80]!r}")
@@ -38,6 +42,8 @@ def bright_cells(name: str, count: int) -> np.ndarray:
     >>> bright_cells("DICT_4X4_50", 2).shape
     (2, 6, 6)
     """
+    import cv2  # as above
+
     dictionary = read_dictionary(name, count)
     cells = dictionary.markerSize + 2
     return np.array([cv2.aruco.generateImageMarker(dictionary, n, cells) > 0 for n in range(count)])
