@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 _HALF = 0.48  # of the way to the next corner
@@ -35,6 +34,8 @@ class Marked:
     def beyond(self, grid: np.ndarray, pixels: np.ndarray) -> np.ndarray:
         """How far pixels (n, m, 2) about each of the corners ``grid`` are past the gap along rows and columns, in
         squares, (n, m, 2); minus infinity where no marker's square is."""
+        import cv2  # slow to load, and rarely needed
+
         rows, columns = grid.shape[:2]
         places = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
         corners, seen = grid.reshape(-1, 2), np.isfinite(grid).all(-1).ravel()
@@ -47,6 +48,8 @@ class Marked:
 
 
 def _projected(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    import cv2  # as above
+
     return cv2.perspectiveTransform(points.reshape(1, -1, 2), matrix).reshape(points.shape)
 
 
