@@ -23,17 +23,33 @@ class Levels(NamedTuple):
 
 
 def shot_noise(noise: Noise, signal: np.ndarray) -> np.ndarray:
-    """Variance that the light's own noise adds at grey levels above darkness: gain x signal, of a linear sensor."""
-    return noise.shot_variance(signal)
+    """Variance that the light's own noise adds at grey levels above darkness: gain x signal, and the excess of a sensor
+    that is not linear.
+
+    >>> shot_noise(Noise(sigma=1.0, gain=0.1, excess=[(0, 0), (10, 2)]), np.array([-1.0, 5.0, 20.0]))
+    array([0. , 1.5, 4. ])
+    """
+    lit = np.maximum(signal, 0.0)
+    straight = noise.shot_gain * lit
+    return straight + np.interp(lit, *zip(*noise.excess, strict=True)) if noise.excess else straight
+
+
+def _shot_slope(noise: Noise, signal: np.ndarray) -> np.ndarray:
+    """Its derivative by the signal."""
+    slope = np.where(signal > 0, noise.shot_gain, 0.0)
+    if not noise.excess:
+        return slope
+    signals, excess = np.array(noise.excess).T
+    bends = np.concatenate([[0.0], np.diff(excess) / np.diff(signals), [0.0]])
+    return slope + bends[np.searchsorted(signals, signal)]
 
 
 def recorded(noise: Noise, level: np.ndarray) -> Levels:
     """What the sensor records of a noise-free image (grey levels, darkness included).
 
     EMVA 1288: sigma_dark^2 + gain (level - dark level) + 1/12 for the rounding, and the excess of a sensor that is not
-    linear. Near the end of the scale a normal
-    distribution is cut off at 2^bits - 1, which lowers mean and variance. The cut at 0 is left out, for the level of
-    darkness keeps the noise away from it; the fixed pattern does not vary.
+    linear. Near the end of the scale a normal distribution is cut off at 2^bits - 1, which lowers mean and variance.
+    The cut at 0 is left out, for the level of darkness keeps the noise away from it; the fixed pattern does not vary.
     """
     level = np.asarray(level, float)
     full = full_scale(noise)
@@ -62,7 +78,7 @@ def sensitivity(noise: Noise, level: np.ndarray) -> np.ndarray:
     level = np.asarray(level, float)
     sigma = np.sqrt(np.maximum(noise.variance + shot_noise(noise, level - noise.dark_level), 1e-300))
     below = (full_scale(noise) - level) / sigma
-    grows = noise.shot_slope(level - noise.dark_level) / (2 * sigma)
+    grows = _shot_slope(noise, level - noise.dark_level) / (2 * sigma)
     return ndtr(below) - np.exp(-(below**2) / 2) / np.sqrt(2 * np.pi) * grows
 
 

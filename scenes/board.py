@@ -119,7 +119,7 @@ class Board(Model):
     @property
     def points(self) -> np.ndarray:
         """Its points, row by row, shape (n, 3), the scene's unit."""
-        return self.at(_numbers(*self.shape))
+        return self.at(numbered(*self.shape))
 
     @property
     def outer(self) -> np.ndarray:
@@ -143,7 +143,7 @@ class Board(Model):
             return np.concatenate([_quads(*self.shape, int(self.before)), squares, bright[:, ::-1]])
         if self.kind == "chessboard":
             return _quads(*self.shape, 0)
-        return _numbers(*self.shape)[:, None] + _polygon(self.radius / self.pitch)
+        return numbered(*self.shape)[:, None] + _polygon(self.radius / self.pitch)
 
     @property
     def triangles(self) -> tuple[np.ndarray, np.ndarray]:
@@ -161,8 +161,11 @@ class Board(Model):
 
 
 @lru_cache(maxsize=16)
-def _numbers(columns: int, rows: int) -> np.ndarray:
-    return np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+def numbered(columns: int, rows: int) -> np.ndarray:
+    """Column and row of each point of a board, row by row, (n, 2); to be read alone."""
+    found = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+    found.setflags(write=False)
+    return found
 
 
 def _squares(columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
@@ -212,7 +215,7 @@ def _border(across: tuple[float, float], down: tuple[float, float], wide: float)
 
 def _quads(columns: int, rows: int, odd: int) -> np.ndarray:
     """Squares (m, 4, 2) of one shade: of even or odd sums of their first corner."""
-    first = _numbers(columns + 1, rows + 1) - 1
+    first = numbered(columns + 1, rows + 1) - 1
     return (first[:, None] + np.array([(0, 0), (1, 0), (1, 1), (0, 1)]))[first.sum(1) % 2 == odd]
 
 
@@ -234,6 +237,6 @@ def _dots(columns: int, rows: int, radius: float) -> tuple[np.ndarray, np.ndarra
     following = np.roll(np.arange(AROUND), -1)
     ring = _halves(np.stack([inner, outer, outer[following], inner[following]], 1))
     fan = np.stack([np.zeros_like(inner), inner, inner[following]], 1)
-    at = _numbers(columns, rows)[:, None, None]
+    at = numbered(columns, rows)[:, None, None]
     margin = _halves(_border((-1.0, float(columns)), (-1.0, float(rows)), 0.5))
     return np.concatenate([(at + ring).reshape(-1, 3, 2), margin]), (at + fan).reshape(-1, 3, 2)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.board import numbered
+
 _HALF = 0.48  # of the way to the next corner
 _REACH = 12.0  # px from the corner; edges are parabolas so far
 _BAND = 5.0  # px beside an edge: further away only levels are told
@@ -37,7 +39,7 @@ class Marked:
         import cv2  # slow to load, and rarely needed
 
         rows, columns = grid.shape[:2]
-        places = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+        places = numbered(columns, rows)
         corners, seen = grid.reshape(-1, 2), np.isfinite(grid).all(-1).ravel()
         matrix = cv2.findHomography(corners[seen], places[seen])[0] if seen.sum() >= _FOUR else None
         if matrix is None:

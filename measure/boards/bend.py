@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from imaging.boards.windows import steps
+from scenes.board import numbered
 
 _DEGREES = ((3, 14), (2, 8))  # of the polynomial, and the corners that it takes
 
@@ -22,8 +23,9 @@ def bends(grid: np.ndarray) -> np.ndarray:
         Corners, (x, y) px; NaN where one is not seen.
     """
     rows, columns = grid.shape[:2]
-    places = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
-    return bends_at(places, grid.reshape(-1, 2), steps(grid).reshape(-1, 2, 2)).reshape(rows, columns, 2)
+    return bends_at(numbered(columns, rows), grid.reshape(-1, 2), steps(grid).reshape(-1, 2, 2)).reshape(
+        rows, columns, 2
+    )
 
 
 def bends_at(places: np.ndarray, corners: np.ndarray, toward: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from measure.boards.bend import bends
 from measure.photo.noise import noise_sigma
 from scenes import status
 from scenes.arrays import BRIGHTEST, picture
+from scenes.board import numbered
 from scenes.errors import InvalidInput
 
 _FALSE_ALARM = 0.01  # of all corners of a board together
@@ -75,14 +76,8 @@ class Board:
     @property
     def places(self) -> np.ndarray:
         """Column and row of each corner on the board, shape (n, 2): to be multiplied by the squares' size."""
-        places = _numbered(*self.shape)
-        if not self.marker:
-            return places
-        return (places[:, None] + self.marker * _numbered(2, 2)).reshape(-1, 2)
-
-
-def _numbered(columns: int, rows: int) -> np.ndarray:
-    return np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2).astype(float)
+        found = numbered(*self.shape)
+        return (found[:, None] + self.marker * numbered(2, 2)).reshape(-1, 2) if self.marker else found
 
 
 def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | None = None) -> Board:
@@ -237,13 +232,8 @@ def respond(image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = 
     return sparse.csr_array((rows.ravel(), (row.ravel(), column.ravel())), (2 * n, image.size))
 
 
-def _start(grid: np.ndarray) -> np.ndarray:
-    """Crossings (n, 5) of a chessboard to begin with."""
-    return _started(grid, steps(grid).reshape(-1, 2, 2))
-
-
 def _started(grid: np.ndarray, toward: np.ndarray) -> np.ndarray:
-    """Edges towards the next corners, an ordinary blur."""
+    """Crossings (n, 5) to begin with: edges towards the next corners (n, 2, 2), an ordinary blur."""
     angles = np.arctan2(toward[..., 1], toward[..., 0])
     return np.column_stack([grid.reshape(-1, 2), angles, np.full(len(toward), np.log(_ORDINARY))])
 

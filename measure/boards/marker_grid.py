@@ -15,6 +15,7 @@ from measure.boards.chessboard import Board, check_noise, check_shape, least_noi
 from measure.boards.reading import Legible
 from measure.photo.noise import noise_sigma
 from scenes.arrays import picture
+from scenes.board import numbered
 from scenes.errors import InvalidInput
 from scenes.markers import read_dictionary
 
@@ -98,8 +99,7 @@ class Markers:
     @property
     def places(self) -> np.ndarray:
         """Of the markers' corners on the board, in ways from one marker to the next, shape (n, 4, 2)."""
-        first = np.stack(np.meshgrid(np.arange(self.columns), np.arange(self.rows)), -1).reshape(-1, 1, 2)
-        return first + self.side * np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
+        return numbered(self.columns, self.rows)[:, None] + self.side * numbered(2, 2)
 
     def sorted(self, seen: list[tuple[int, np.ndarray]]) -> np.ndarray:
         """The grid of markers that are seen, (number, corners (4, 2), clockwise) each; NaN where none is.

@@ -72,10 +72,8 @@ def _is_doubtful(clean: np.ndarray, layout: Layout, name: str, threshold: float)
 def _offsets(images: np.ndarray, layout: Layout, name: str, threshold: float) -> tuple[np.ndarray, np.ndarray]:
     """How far lines in images (n, height, width) lie from the expected edges' ends, px, (n, E, 2), and whether they are
     found, (n, E)."""
-    shape, calipers = (
-        find_shape(images, layout, name, threshold, judged=False),
-        prepared(layout, name, threshold).calipers,
-    )
+    shape = find_shape(images, layout, name, threshold, judged=False)
+    calipers = prepared(layout, name, threshold).calipers
     ends = np.array([each.at(np.array([0.0, each.length]), np.zeros(2)) for each in calipers])
     away = np.einsum("nei,neki->nek", shape.normals, shape.points[:, :, None] - ends)
     whole = np.isin(shape.whole, status.MEASURED)

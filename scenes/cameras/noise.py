@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from scenes.cameras.colour import Colour
@@ -81,25 +80,6 @@ class Noise(Model):
     def shot_gain(self) -> float:
         """Variance that the light's own noise adds over the signal, of the same white noise [grey levels]."""
         return self.factor(1) * self.gain
-
-    def shot_variance(self, signal: np.ndarray) -> np.ndarray:
-        """Variance that the light's own noise adds at signals above darkness [grey levels], of the same white noise.
-
-        >>> Noise(sigma=1.0, gain=0.1, excess=[(0, 0), (10, 2)]).shot_variance(np.array([-1.0, 5.0, 20.0]))
-        array([0. , 1.5, 4. ])
-        """
-        signal = np.maximum(signal, 0.0)
-        straight = self.shot_gain * signal
-        return straight + np.interp(signal, *zip(*self.excess, strict=True)) if self.excess else straight
-
-    def shot_slope(self, signal: np.ndarray) -> np.ndarray:
-        """Its derivative by the signal."""
-        slope = np.where(np.asarray(signal) > 0, self.shot_gain, 0.0)
-        if not self.excess:
-            return slope
-        signals, excess = np.array(self.excess).T
-        bends = np.concatenate([[0.0], np.diff(excess) / np.diff(signals), [0.0]])
-        return slope + bends[np.searchsorted(signals, signal)]
 
     def factor(self, power: int) -> float:
         """`Colour.noise_factor`; 1 of a monochrome sensor."""

@@ -13,7 +13,7 @@ from imaging.boards.windows import steps, windows
 from measure.boards import chessboard
 from measure.boards.adjustment import _inverse, _object
 from measure.boards.camera import CameraCalibration, _calibration, _check
-from measure.boards.chessboard import _board, _clipped, _nothing, _start, check_shape, least_noise
+from measure.boards.chessboard import _board, _clipped, _nothing, _started, check_shape, least_noise
 from measure.boards.growing import _alternates, _alternation, _next, grown, trimmed
 from measure.boards.parameters import read_model
 from measure.photo import board_noise
@@ -151,7 +151,7 @@ def test_windows_lie_in_the_image(first, shape, without):
 
 
 def test_what_a_fit_of_crossings_begins_with():
-    found = _start(sheared(3, 4))
+    found = _started(sheared(3, 4), steps(sheared(3, 4)).reshape(-1, 2, 2))
     assert found[:, :2] == pytest.approx(sheared(3, 4).reshape(-1, 2))
     assert found[:, 2] == pytest.approx(np.full(12, np.arctan2(3, 14)))
     assert found[:, 3] == pytest.approx(np.full(12, np.arctan2(21, -5)))

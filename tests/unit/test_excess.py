@@ -34,8 +34,8 @@ def test_an_excess_that_is_a_line_is_gain():
 
 def test_a_slope_is_that_of_the_variance():
     signals = np.array([-5.0, 1.0, 39.0, 41.0, 119.0, 130.0])
-    up, down = (BENT.shot_variance(signals + step) for step in (1e-4, -1e-4))
-    assert BENT.shot_slope(signals) == pytest.approx((up - down) / 2e-4, rel=1e-6, abs=1e-9)
+    up, down = (sensor.shot_noise(BENT, signals + step) for step in (1e-4, -1e-4))
+    assert sensor._shot_slope(BENT, signals) == pytest.approx((up - down) / 2e-4, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("estimator", ["gradient", "strip"])
