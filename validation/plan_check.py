@@ -17,6 +17,7 @@ from validation import simulation
 from validation.remeasured import GRADIENT, propagated
 
 ESTIMATOR = GRADIENT.locator
+FARTHEST = 1.25  # times the least variance that a picture told: what is dearer by the plan is not rendered unasked
 _SAME = 7.5  # degrees; half of what keeps candidates apart, so at most one of them is the plan's own place
 
 
@@ -88,6 +89,8 @@ class PlanCheck:
         Why nothing can be measured.
     seconds : float
         What rendering and measuring took.
+    left_out : int
+        Settings that were not rendered, for no picture would put them first.
     """
 
     settings: tuple[CheckedSetting, ...]
@@ -95,6 +98,7 @@ class PlanCheck:
     order_changed: bool | None
     reason: str
     seconds: float
+    left_out: int = 0
 
     @property
     def without_formula(self) -> tuple[str, ...]:
@@ -107,6 +111,7 @@ def check_plan(
     count: int = 10,
     quality: Quality = Quality(),
     report: Callable[[str, int, int], None] = lambda *_: None,
+    farthest: float = np.inf,
 ) -> PlanCheck:
     """Render the best settings of a plan and predict their variances from the noise-free pictures.
 
@@ -121,6 +126,8 @@ def check_plan(
         Rays a pixel.
     report : callable, optional
         Called with what is done, how many are done, and of how many.
+    farthest : float
+        Settings are left out of which the plan says more than this times the least that an ``ok`` picture said.
 
     Raises
     ------
@@ -133,20 +140,28 @@ def check_plan(
     settings = _best(found)[:count]
     try:
         measure.region_of_interest(found.scene, found.sensor, estimators=(ESTIMATOR,))  # measurable, before it costs
-        for done, setting in enumerate(settings):
+        for done, (variance, *setting) in enumerate(settings):
+            if farthest < np.inf and variance > farthest * _least(rows):
+                break
             report("settings", done, len(settings))
             rows.append(_checked(found, *setting, rank=done + 1, quality=quality))
         report("settings", len(settings), len(settings))
     except InvalidInput as error:
         rows, reason = [], str(error)
-    return _judged(rows, reason, time.perf_counter() - began)
+    checked, left = _judged(rows, reason, time.perf_counter() - began), len(settings) - len(rows)
+    return replace(checked, left_out=left) if rows and left else checked
 
 
-def _best(found: planner.Plan) -> list[tuple[Pose, Pose, tuple[str, ...]]]:
-    """The plan, and its candidates from other places, the best first."""
-    here = found.sensor, found.light, found.scene.required
-    others = [(c.sensor, c.light, c.edges) for c in found.candidates]
-    return [here, *(other for other in others if not _same(here, other))]
+def _least(rows: list[CheckedSetting]) -> float:
+    """The least that an ``ok`` picture told; infinite without one."""
+    return min((row.minimised for row in rows if status.is_trusted(row.status)), default=np.inf)
+
+
+def _best(found: planner.Plan) -> list[tuple[float, Pose, Pose, tuple[str, ...]]]:
+    """The plan, and its candidates from other places, the best first, each with what is minimised."""
+    here = found.variance, found.sensor, found.light, found.scene.required
+    others = [(c.variance, c.sensor, c.light, c.edges) for c in found.candidates]
+    return [here, *(other for other in others if not _same(here[1:], other[1:]))]
 
 
 def _same(first: tuple, second: tuple) -> bool:

@@ -1,6 +1,7 @@
 """A plan's best settings, rendered: what the pictures say of their order, and whether noisy pictures bear it out."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import render
 import scenes
 from render import Quality
 from scenes import Pose
+from validation import plan_check
 from validation.plan_check import CheckedSetting, PlanCheck, _judged, check_plan
 from validation.statistics import p_value
 
@@ -114,6 +116,31 @@ def test_best_of_other_edges_is_measured_with_those(task1):
     assert found.settings[1].edges == other.edges
     scene = task1.model_copy(update={"task": other})
     assert found.settings[1].calibrated == planner.predict(scene, (45, 135), (15, 315)).variance_object
+
+
+def test_what_no_picture_would_put_first_is_not_rendered(monkeypatch):
+    """Beyond so many times the least that a picture told; but one that is no `ok` picture leaves nothing out."""
+    poses = [Pose(30, k) for k in (0, 20, 40, 60)]
+    variances = dict(zip(poses, (1.0, 1.1, 1.4, 1.5), strict=True))
+
+    def checked(found, sensor, light, edges, rank, quality):
+        variance, state = variances[sensor], "clutter" if sensor in found.cluttered else "ok"
+        return CheckedSetting(sensor, light, edges, variance, variance, state, (), rank)
+
+    def plan(cluttered):
+        others = [SimpleNamespace(sensor=p, light=p, edges=("e1",), variance=variances[p]) for p in poses[1:]]
+        return SimpleNamespace(sensor=poses[0], light=poses[0], variance=1.0, scene=SimpleNamespace(required=("e1",)),
+                               candidates=others, cluttered=cluttered)  # fmt: skip
+
+    monkeypatch.setattr(plan_check, "_checked", checked)
+    monkeypatch.setattr(measure, "region_of_interest", lambda *_, **__: None)
+    found = check_plan(plan([]), farthest=1.25)
+    assert ([row.sensor for row in found.settings], found.left_out) == (poses[:2], 2)
+    found = check_plan(plan(poses[:1]), farthest=1.25)  # 1.1 is the least that is ok
+    assert ([row.sensor for row in found.settings], found.left_out) == (poses[:2], 2)
+    assert found.proposed is found.settings[1]
+    assert check_plan(plan(poses), farthest=1.25).left_out == 0
+    assert check_plan(plan([])).left_out == 0
 
 
 def rows(*settings: tuple[float, float, str]) -> list[CheckedSetting]:

@@ -250,7 +250,7 @@ def test_the_plan_s_json_is_the_plan(planned, several):
     assert [row["propagated"] for row in told_["checked"]] == [0.012, 0.0115, None]
     assert [row["ratio"] for row in told_["checked"]] == [pytest.approx(1.2), pytest.approx(0.575), None]
     assert told_["proposed"] == told_["checked"][1]
-    assert told_["check"] == {"without_formula": ["floor", "blur"], "reason": None, "seconds": 3.5}
+    assert told_["check"] == {"without_formula": ["floor", "blur"], "reason": None, "seconds": 3.5, "left_out": 0}
     assert {key: told_["robust"][key] for key in ("sensor", "light", "worst", "nominal", "plan_worst", "cases")} == {
         "sensor": [31.5, 42], "light": [21.25, 250.5], "worst": 0.5, "nominal": 0.25, "plan_worst": 0.75, "cases": 50,
     }  # fmt: skip

@@ -340,5 +340,5 @@ def test_what_takes_long_in_a_plan_says_at_once_that_it_works(monkeypatch, task1
     monkeypatch.setattr(vary_check, "check_varied", lambda *_, **__: "varied")
     assert plan._plan(task1, "distance", {})[0] == "plan"
     found = SimpleNamespace(scene=task1)
-    assert (plan._check(found, 3), plan._check_varied(found)) == ("checked", "varied")
+    assert (plan._check(found, 3, asked=False), plan._check_varied(found)) == ("checked", "varied")
     assert said == [("steps", True), ("settings", True), ("plans", True)]

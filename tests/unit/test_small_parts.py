@@ -108,11 +108,11 @@ def test_settings_in_nearly_the_same_place_are_rendered_once(first):
         (Pose(first[0] + near, first[1]), here[1]), (Pose(first[0] + far, first[1]), here[1]),
         (here[0], (Pose(20 + near, 40), Pose(60, 359.9))), (here[0], (Pose(20, 40), Pose(60 + far, 359.9))),
     ]  # fmt: skip
-    candidates = [SimpleNamespace(sensor=s, light=k, edges=("e2",)) for s, k in moved]
+    candidates = [SimpleNamespace(sensor=s, light=k, edges=("e2",), variance=2.0) for s, k in moved]
     found = SimpleNamespace(
-        sensor=here[0], light=here[1], scene=SimpleNamespace(required=here[2]), candidates=candidates
+        sensor=here[0], light=here[1], variance=1.0, scene=SimpleNamespace(required=here[2]), candidates=candidates
     )
-    assert plan_check._best(found) == [here, (*moved[1], ("e2",)), (*moved[3], ("e2",))]
+    assert plan_check._best(found) == [(1.0, *here), (2.0, *moved[1], ("e2",)), (2.0, *moved[3], ("e2",))]
     assert plan_check._angle(Pose(60, 359), Pose(60, 1)) == pytest.approx(
         2 * np.degrees(np.arcsin(np.sin(np.radians(1)) * np.sin(np.radians(60))))
     )
@@ -154,10 +154,11 @@ def test_a_plan_is_checked_where_it_can_be_measured(monkeypatch):
     monkeypatch.setattr(
         measure, "region_of_interest", lambda scene, sensor, estimators: asked.append((sensor, estimators))
     )
-    candidates = [SimpleNamespace(sensor=Pose(30, k), light=Pose(70, k), edges=("e2",)) for k in (100, 200)]
+    candidates = [SimpleNamespace(sensor=Pose(30, k), light=Pose(70, k), edges=("e2",), variance=k) for k in (100, 200)]
     found = SimpleNamespace(
-        sensor=Pose(10, 20), light=Pose(50, 60), scene=SimpleNamespace(required=("e1",)), candidates=candidates
-    )
+        sensor=Pose(10, 20), light=Pose(50, 60), variance=1.0, scene=SimpleNamespace(required=("e1",)),
+        candidates=candidates,
+    )  # fmt: skip
     rows, reason = plan_check.check_plan(found, 2, "quick", lambda *told: said.append(told))
     assert asked == [(Pose(10, 20), (plan_check.ESTIMATOR,))]
     assert rows == [

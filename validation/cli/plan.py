@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -265,7 +266,7 @@ def _planned(scene: scenes.Scene, given: Options, how: dict, count: int) -> Plan
     how |= {"search": given.search, "edges": given.edges, "shares": given.shares}
     found, seconds = _plan(scene, given.objective, how | _varied(scene, given.vary, given.hold))
     safe = planner.robust(found, tolerances, how["constraints"]) if tolerances else None
-    checked = _check(found, count) if count else None
+    checked = _check(found, count, asked=given.check is not None) if count else None
     scatter = _check_varied(found) if found.varied and count else None
     return Planned(found, seconds, checked, scatter, safe)
 
@@ -328,11 +329,12 @@ def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan,
     return found, time.perf_counter() - began
 
 
-def _check(found: planner.Plan, count: int) -> PlanCheck:
-    from validation.plan_check import check_plan
+def _check(found: planner.Plan, count: int, asked: bool) -> PlanCheck:
+    """Of settings whose number was not asked for, those alone that a picture might put first."""
+    from validation.plan_check import FARTHEST, check_plan
 
     with progress(f"{found.scene.name}: rendering and measuring the best {count}", "settings", at_once=True) as shown:
-        return check_plan(found, count, report=shown)
+        return check_plan(found, count, report=shown, farthest=math.inf if asked else FARTHEST)
 
 
 def _check_varied(found: planner.Plan) -> VaryCheck:

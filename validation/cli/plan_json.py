@@ -100,6 +100,7 @@ def _checked(checked: PlanCheck | None) -> dict:
             "without_formula": list(checked.without_formula),
             "reason": checked.reason or None,
             "seconds": checked.seconds,
+            "left_out": checked.left_out,
         },
     }
 

@@ -12,7 +12,7 @@ import planner
 from planner.search.candidates import Candidate, how_far
 from render import EffectTolerance
 from scenes.status import MEANINGS, is_trusted, legend
-from validation.plan_check import ESTIMATOR, CheckedSetting, PlanCheck
+from validation.plan_check import ESTIMATOR, FARTHEST, CheckedSetting, PlanCheck
 from validation.report.cells import MODELS
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
@@ -219,6 +219,11 @@ def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
         many = sum(bool(row.without_formula) for row in checked.settings)
         names = ", ".join(checked.without_formula)
         lines.append(f"  Without a formula, so that only the pictures know: {names} (in {many} of them).")
+    if checked.left_out:
+        lines.append(
+            f"  The next {checked.left_out} of the table were not rendered: more than {FARTHEST:g} times the least "
+            f"variance found (--check {len(checked.settings) + checked.left_out} renders them, too)."
+        )
     lines.append(f"  The check took {checked.seconds:.1f} s (--no-check leaves it out).")
     return Group(_checked_table(found, checked), Text("\n".join(lines)))
 
