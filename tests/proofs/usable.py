@@ -3,8 +3,9 @@
 Camera and lights stand 10 to 50 degrees off the vertical, anywhere around; lights that go with the camera, or face it,
 stand where they do. Before a light that faces it the camera stands up to twice as far off as in the scene's settings:
 the light has to be behind the part. Measured is a value where a prediction without an image says that it can be,
-whatever its bias; then its bias is simulated and taken off, as `ice measure` does, by the picture's default estimator,
-and it is counted whether it is `ok`. At least 90 % have to be.
+whatever its bias (not where it says that a board beside the part is hidden: `unplaced`); then its bias is simulated and
+taken off, as `ice measure` does, by the picture's default estimator, and it is counted whether it is `ok`. At least 90
+% have to be.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import planner
 import scenes
 from imaging.light.backlight import backlights
 from scenes import Picture, Pose, Scene
-from scenes.status import MEASURED, is_trusted
+from scenes.status import CLUTTER, OK, is_trusted
 from validation import simulation
 from validation.remeasured import Method
 
@@ -42,7 +43,7 @@ def _anywhere(rng: np.random.Generator, least: float = 10.0, most: float = 50.0)
 
 def measurable(picture: Picture) -> np.ndarray:
     """Which of the M values a prediction calls measurable, bool (M,)."""
-    return np.array([each.status in MEASURED for each in planner.predict(picture).measurands])
+    return np.array([each.status in (OK, CLUTTER) for each in planner.predict(picture).measurands])
 
 
 def states(scene: Scene, poses: int, seed: int) -> list[str]:
