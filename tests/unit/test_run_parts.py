@@ -1,11 +1,13 @@
 """What a job commits, which images it keeps, and which machines give the same numbers."""
 
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from validation.batch import job, machine, work
+from validation.batch.campaign import Campaign
 from validation.batch.stages import Stages
 from validation.batch.store import RunFile
 
@@ -112,3 +114,37 @@ def test_the_time_of_a_run_goes_on_from_what_it_had_taken(known, done, monkeypat
     monkeypatch.setattr(job.time, "perf_counter", lambda: next(clock))
     job._finish(batch)
     assert noted == ({"wall": known.get("wall", 0.0) + 2.5, "workers": 3} if done else {})
+
+
+@pytest.mark.parametrize(("most", "together", "submitted"), [(10_000, 1, 48), (16, 1, 48), (15, 2, 8), (5, 4, 4)])
+def test_of_more_settings_than_a_scheduler_keeps_count_of_several_are_one_task(
+    most, together, submitted, tmp_path, task1, monkeypatch
+):
+    """Task1's 16 settings of three chunks: one by one a task each, of few tasks whole settings together; all are done
+    once, whatever is grouped."""
+    done, count = [], []
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, fn, *args):
+            count.append(len(args[0]))
+            return super().submit(fn, *args)
+
+    def perform(task):
+        done.append((task.case.index, task.chunks))
+        clean = work.Clean(work.Packed.of(np.zeros((2, 3))), {}, {}, {})
+        chunks = {k: work.Chunk({"gradient": np.zeros(n)}, {}, {}) for k, n in task.chunks}
+        return work.TaskResult(None if task.image else clean, chunks)
+
+    monkeypatch.setattr(job, "_MOST_TASKS", most)
+    monkeypatch.setattr(work, "perform", perform)
+    store = RunFile(tmp_path / "run", {"campaign": {}, "seed": 1})
+    options = job.RunOptions(1, tmp_path, 1, False, None)
+    batch = job._Batch(Campaign.of(task1), options, 3 * work.CHUNK, "scalar_rgb", store, lambda *_: None)
+    with Counting(1) as executor:
+        batch._work(job.Crew(executor, lambda: 3))
+    assert (max(count), len(count)) == (together, submitted)
+    assert store.images() == batch.done == batch.total == 16 * 3 * work.CHUNK
+    assert sorted((index, k) for index, chunks in done for k, _ in chunks) == [
+        (i, k) for i in range(16) for k in range(3)
+    ]
+    store.close()

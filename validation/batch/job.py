@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import imaging
@@ -40,6 +42,7 @@ log = logging.getLogger("validation")
 _PACKAGES = (PROGRAM, "mitsuba", "drjit", "numpy", "scipy", "opencv-contrib-python-headless")
 _PHOTOGRAPHS = "photographs"  # in the place of the renderer's variant
 _MAX_CHUNKS = 4  # of a task: its results are lost if it is killed
+_MOST_TASKS = 10_000  # of a run, which a scheduler keeps count of: beyond, whole settings are done together
 _IMAGES = 64  # settings whose image is kept for the report
 _BREAKS = 3  # deaths of workers without a finished task in between, before it is no accident
 _CHECK_S = 5.0  # between looks at whether the workers are still there
@@ -255,18 +258,18 @@ class _Batch:
 
     def _work(self, crew: Crew) -> None:
         """Keep every worker busy, with no more tasks in flight than that needs: memory does not grow with the run."""
-        pending: dict[Future, _Setting] = {}
+        pending: dict[Future, list[_Setting]] = {}
         opened: deque[_Setting] = deque()
         size = crew.size()
-        group, fresh = self._group(size), self._settings()
+        together, group, fresh = self._together(), self._group(size), self._settings()
         while True:
             while len(pending) < size + 2:
-                setting = opened.popleft() if opened else next(fresh, None)
-                if setting is None:
+                settings = [opened.popleft()] if opened else list(islice(fresh, together))
+                if not settings:
                     break
-                pending[crew.executor.submit(work.perform, setting.next_task(group))] = setting
-                if setting.task.image and setting.left:
-                    opened.appendleft(setting)
+                tasks = tuple(setting.next_task(group) for setting in settings)
+                pending[crew.executor.submit(work.perform_all, tasks)] = settings
+                opened.extendleft(setting for setting in settings if setting.task.image and setting.left)
             if not pending:
                 return
             done = wait(pending, timeout=_CHECK_S, return_when=FIRST_COMPLETED).done
@@ -274,14 +277,14 @@ class _Batch:
                 crew.check(None)
                 size = crew.size()
             for future in done:
-                setting = pending.pop(future)
-                found = self._result(future, crew)
-                self._commit(setting.task.case.index, found)
-                if found.clean and setting.left:
-                    setting.task = replace(setting.task, image=found.clean.image)
-                    opened.append(setting)
+                settings = pending.pop(future)
+                for setting, found in zip(settings, self._results(future, crew), strict=True):
+                    self._commit(setting.task.case.index, found)
+                    if found.clean and setting.left:
+                        setting.task = replace(setting.task, image=found.clean.image)
+                        opened.append(setting)
 
-    def _result(self, future: Future, crew: Crew) -> TaskResult:
+    def _results(self, future: Future, crew: Crew) -> tuple[TaskResult, ...]:
         try:
             return future.result()
         except Exception as error:
@@ -322,7 +325,13 @@ class _Batch:
 
     def _group(self, size: int) -> int:
         """Chunks of a task: large enough that an image travels seldom, small enough that all finish together."""
+        if self._together() > 1:
+            return self.total  # all that a setting has
         return max(1, min(_MAX_CHUNKS, self.total // CHUNK // (16 * size)))
+
+    def _together(self) -> int:
+        """Settings of a task."""
+        return math.ceil(len(self.settings) / _MOST_TASKS)
 
 
 @dataclass

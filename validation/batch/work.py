@@ -164,6 +164,11 @@ def perform(task: Chunks) -> TaskResult:
         return _perform(task)
 
 
+def perform_all(tasks: tuple[Chunks, ...]) -> tuple[TaskResult, ...]:
+    """Several pieces of work as one, where a scheduler could not keep count of each."""
+    return tuple(map(perform, tasks))
+
+
 @functools.cache
 def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
