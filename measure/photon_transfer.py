@@ -13,6 +13,7 @@ from scenes.arrays import picture
 
 _LINEAR = 0.7  # of the signal whose variance is greatest: up to there the slope is told (EMVA 1288, 6.6)
 _BENT = 0.05  # part of a step's variance by which the line may miss it
+_TRACE = 1e-6  # of variance, where frames tell none
 _SURE = 3.0  # standard errors beyond which rows, columns or a bend are told from chance
 _FEWEST = 3  # steps
 
@@ -123,7 +124,7 @@ def photon_transfer(lit: Sequence[FramePair], dark: Sequence[FramePair], bits: i
     rows, columns = (_shared([getattr(pair, name) for pair in dark]) for name in ("rows", "columns"))
     white = float(dark_variance.mean()) - rows - columns - (0.0 if bits is None else 1 / 12)
     noise = Noise(
-        sigma=float(np.sqrt(max(white, 1e-6))), gain=gain, dark_level=float(base.mean()), bits=bits,
+        sigma=float(np.sqrt(max(white, _TRACE))), gain=gain, dark_level=float(base.mean()), bits=bits,
         row_sigma=float(np.sqrt(rows)), column_sigma=float(np.sqrt(columns)),
     )  # fmt: skip
     missed = np.abs((variance / (dark_variance.mean() + gain * np.maximum(signal, 0.0)))[used] - 1)
@@ -134,10 +135,16 @@ def photon_transfer(lit: Sequence[FramePair], dark: Sequence[FramePair], bits: i
 
 
 def _followed(noise: Noise, signal: np.ndarray, extra: np.ndarray) -> Noise:
-    """The noise with what steps (n,) have beside gain x signal; as it is where light adds none."""
-    order = np.argsort(signal)
-    rows = [(0.0, 0.0), *((s, e - noise.gain * s) for s, e in zip(signal[order], extra[order], strict=True) if s > 0)]
-    return noise.tried(excess=tuple((float(s), float(e)) for s, e in rows)) if noise.gain > 0 else noise
+    """The noise with what steps (n,) have beside gain x signal; as it is where light adds none.
+
+    Steps of one signal are one, and light that seems to take noise away leaves a trace of it: few pixels may say so.
+    """
+    if not noise.gain > 0:
+        return noise
+    steps = np.unique(signal[signal > 0])
+    more = np.array([extra[signal == step].mean() for step in steps])
+    beside = np.maximum(more, _TRACE - noise.sigma**2) - noise.gain * steps
+    return noise.tried(excess=((0.0, 0.0), *zip(steps.tolist(), beside.tolist(), strict=True)))
 
 
 def _shared(parts: list[float]) -> float:

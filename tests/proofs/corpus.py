@@ -196,6 +196,9 @@ def corpus(
     jobs: Annotated[int, typer.Option(help="Parts at a time.")] = 1,
 ) -> None:
     """Parts from files through new, show, plan, render, measure and validate; resumable."""
+    for word in (until, *(skip or ())):
+        if word not in COMMANDS:
+            raise typer.BadParameter(f"--until and --skip must be of {', '.join(COMMANDS)}, got {word!r}")
     files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in KINDS)
     if sample:
         files = [files[k] for k in np.random.default_rng(seed).permutation(len(files))[:sample]]

@@ -79,6 +79,16 @@ def test_photon_transfer_follows_it():
     assert np.abs(off).max() > 0.1
 
 
+def test_steps_of_one_signal_are_one_and_none_takes_the_noise_away():
+    """Two exposures of one level, and one whose light seems to take more noise away than there is in the dark."""
+    signals, variances = [0.0, 20.0, 40.0, 40.0, 80.0, 160.0], [4.0, 0.0, 8.0, 9.0, 12.0, 20.0]
+    lit = [FramePair(10.0 + s, v, 0.0, 0.0, 1000) for s, v in zip(signals, variances, strict=True)]
+    found = photon_transfer(lit, [FramePair(10.0, 4.0, 0.0, 0.0, 1000)] * 6).followed
+    assert [signal for signal, _ in found.excess] == [0.0, 20.0, 40.0, 80.0]
+    assert Noise.model_validate(found.model_dump()) == found  # as a scene's file would be checked
+    assert found.excess[2][1] == pytest.approx(8.5 - 4.0 - 40 * found.gain)
+
+
 def test_what_does_not_know_it_says_so():
     scene = scenes.load("task1")
     assert has_bound(scene.with_(noise=STRAIGHT), "calibrated")
