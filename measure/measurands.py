@@ -225,7 +225,14 @@ def measure_by(
     for name, threshold in methods:
         check_method(name, threshold)
     camera = picture.scene.camera
-    images = checked_image(image, (camera.height, camera.width))
+    return exposures_by(checked_image(image, (camera.height, camera.width)), picture, methods)
+
+
+def exposures_by(
+    images: np.ndarray, picture: Picture, methods: Sequence[tuple[str, float | None]]
+) -> tuple[Measurements, ...]:
+    """The same of float64 images that are known to be the camera's: looking at each pixel of them is most of the work
+    where few are measured."""
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
     return tuple(
         _gathered(find(stack, picture, *method), picture, saturated(stack, picture, method[0]), lead)

@@ -9,6 +9,7 @@ picture is, whatever made it so.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtr
@@ -36,9 +37,15 @@ def saturated(images: np.ndarray, picture: Picture, estimator: str) -> np.ndarra
         Of the straight edges.
     """
     end = _end(picture.scene.noise)
-    if images.size == 0 or not images.max() >= end:
+    if images.size == 0 or np.isinf(end):
         return np.zeros(len(images), int)
-    return (images[:, region_of_interest(picture, estimators=(estimator,))] >= end).sum(1)
+    return (images.reshape(len(images), -1)[:, _looked_at(picture, estimator)] >= end).sum(1)
+
+
+@lru_cache(maxsize=8)
+def _looked_at(picture: Picture, estimator: str) -> np.ndarray:
+    """Numbers of the pixels, counted row by row."""
+    return np.flatnonzero(region_of_interest(picture, estimators=(estimator,)))
 
 
 def limits(

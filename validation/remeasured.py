@@ -10,6 +10,7 @@ import numpy as np
 
 import measure
 import render
+from measure.measurands import exposures_by
 from measure.propagation import PropagatedValues
 from render import Quality
 from scenes import Picture
@@ -105,7 +106,7 @@ def remeasured(
     for images in exposures:
         lap("expose")
         for found, method in zip(parts, methods, strict=True):
-            found += measure.measure_by(images, picture, ((method.locator, method.threshold),))
+            found += exposures_by(images, picture, ((method.locator, method.threshold),))
             lap(method.name)
     return tuple(_joined(found) for found in parts)
 

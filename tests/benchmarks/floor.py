@@ -1,7 +1,7 @@
 """How far exposing and measuring is from its floor: ``python -m tests.benchmarks.floor [SCENE ...]``.
 
 The floor of an image: normals for the pixels that the estimator reads, made into whole grey levels, and one weighted
-sum of them for each value. Beside it what `ice validate` does with an image, `render.Exposer` and `measure.measure_by`;
+sum of them for each value. Beside it what `ice validate` does with an image, `render.Exposer` and `exposures_by`;
 a picture's preparation is paid before. Both in turn, by the processor's time; no test, for times are machines'.
 """
 
@@ -18,6 +18,7 @@ import measure
 import render
 import scenes
 from imaging import sensor
+from measure.measurands import exposures_by
 from scenes import Picture
 from validation.batch.work import batch_size
 
@@ -76,7 +77,7 @@ def cost(name: str) -> Cost:
     images = exposed()
 
     def measured() -> None:
-        measure.measure_by(images, picture, (("gradient", None),))
+        exposures_by(images, picture, (("gradient", None),))
 
     measured()
     times = np.array([[_milliseconds(each) for each in (floor, exposed, measured)] for _ in range(_TURNS)])

@@ -378,7 +378,7 @@ def test_lost_pictures_are_not_in_the_interval_of_a_plan_s_scatter(task1, monkey
     seen = SimpleNamespace(value=values, value_image=80 * values + 1, status=states)
     monkeypatch.setattr(vary_check.render, "expose", lambda *_: None)
     monkeypatch.setattr(vary_check, "propagated", lambda *_: (None, known))
-    monkeypatch.setattr(remeasured.measure, "measure_by", lambda *_: (seen,))
+    monkeypatch.setattr(remeasured, "exposures_by", lambda *_: (seen,))
     for objective, scale, propagated in (("object", 1.0, 2e-4), ("image", 6400.0, 3e-2)):
         plan = SimpleNamespace(scene=task1, objective=objective, over="minimax", model="calibrated")
         chosen = SimpleNamespace(scene=task1, sensor=(30, 135), light=(15, 315))
