@@ -27,6 +27,7 @@ from validation.report import (
     station_sketch,
     station_table,
     station_view,
+    time_figure,
 )
 from validation.report.grades import LOOKS, MEANS
 from validation.report.page_tables import Table
@@ -273,4 +274,5 @@ def budget_sections(found: SceneBudget | None) -> list[Section]:
 def _done(found: Validation, store: RunFile) -> Section:
     folded = [page_tables.facts(found, store)]
     effects = page_tables.effects(found, store)
-    return Section("How it was done", folded=folded + [effects] * bool(effects.rows))
+    plots = [Plot(time_figure.drawn(found.seconds, store.images()), "Where the time went.")]
+    return Section("How it was done", plots=plots, folded=folded + [effects] * bool(effects.rows))
