@@ -132,7 +132,8 @@ class StepPart:
             straight[row] = any(edge.bend >= TANGENT and edge.holds(ends[row], near) for edge in there)
         surface = self._continued[self.triangle_faces[of_faces]]
         flat = np.array([isinstance(each, Plane) for each in self.surfaces])[self.triangle_faces[of_faces]]
-        return Facets(np.where(flat, -1, surface), smooth, ~smooth & ~straight)
+        region = np.where(flat, -1, surface)
+        return Facets(region, region, smooth, ~smooth & ~straight)
 
     @cached_property
     def _continued(self) -> np.ndarray:
