@@ -1,7 +1,7 @@
 """Which straight and circular sharp edges a STEP file has, asked of OpenCASCADE alone: an oracle of recognised ones.
 
-Curves of other kinds (splines, ellipses, very short arcs) may be straight as nearly as features are compared: they need not
-be offered, and may be.
+Curves of other kinds (splines, ellipses, very short arcs) may be straight as nearly as features are compared: they
+need not be offered, and may be.
 """
 
 from __future__ import annotations

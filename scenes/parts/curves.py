@@ -9,11 +9,8 @@ from scenes.parts.chains import Chains, components, pairs_of
 _CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
 LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
 _FULL = 0.7  # of the turn before: where a straight edge begins it is half of it, at a last piece all
-_LAST, _HALVED = 1.5, 2.2  # lengths of the piece before: a last piece, of a curve whose ends are divided half as often
-_EVEN, _EQUAL = (
-    0.05,
-    0.01,
-)  # of a length: pieces about as long, and of one length, which a straight edge has not by chance
+_LAST, _HALVED = 1.5, 2.2  # lengths of the piece before: a last piece; that of even pieces
+_EVEN, _EQUAL = 0.05, 0.01  # of a length: even pieces; those of one length, as a straight edge is not by chance
 
 
 def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:

@@ -225,8 +225,8 @@ def _continued(shape: Chains, ends: np.ndarray, inner: np.ndarray) -> np.ndarray
 def _dangling(shape: Chains, edges: np.ndarray, facet: np.ndarray) -> np.ndarray:
     """Which of the chains that may be edges end in the middle of a surface, or follow such ones; bool, shape (C,).
 
-    Only those that bend no more than the facets of a curve do: an edge ends where others do. Between two ``facet``, (F,),
-    twice as much: files turn a triangle of a free surface over by so much, where they divide it badly.
+    Only those that bend no more than the facets of a curve do: an edge ends where others do. Between two of the faces
+    that are a ``facet``, (F,), twice as much: so far do files turn a triangle over where they divide a surface badly.
     """
     most = np.where(facet[shape.faces].all(1), 2 * _BEND, _BEND)
     left, size = edges.copy(), shape.ends.max(initial=0) + 1

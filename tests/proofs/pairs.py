@@ -42,7 +42,7 @@ class Match:
     false : ndarray, shape (n, ...)
         Offered ones that are none.
     part : ndarray, shape (m, ...)
-        Offered ones that lie on a straight edge, but end elsewhere: halves of it, or a little of a curve that continues it.
+        Offered ones that lie on a straight edge and end elsewhere: halves, or a little of a curve that continues it.
     """
 
     there: int

@@ -125,8 +125,10 @@ def sharp(lines, nearly=np.zeros((0, 2, 3)), curves=np.zeros((0, 9, 3))):
 
 
 def test_what_lies_on_a_straight_edge_is_none_that_there_is_not():
-    """An edge of 10, half of it, and a bit longer along the circle of radius 100 that continues it; a short spline that is
-    straight to a micrometre; 0.002 beside the edge, and the circle's first chord, are none that there are."""
+    """An edge, half of it, and it with a bit of the circle of radius 100 that continues it; a spline that is straight.
+
+    Beside the edge by 0.002, and the circle's first chord, are none that there are.
+    """
     turn = np.linspace(0, 0.1, 65)
     circle = np.stack([10 + 100 * np.sin(turn), 100 - 100 * np.cos(turn), 0 * turn], -1)
     spline = np.array([[[0.0, 5, 0], [1, 5, 0]]])
