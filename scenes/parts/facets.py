@@ -97,9 +97,11 @@ def facets(
     curves = edging | curved(shape, region, ~smooth & ~edging)
     unsure = _unsure(shape, facet)
     within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
-    curves |= within | _chords(shape, facet | unsure, smooth)
+    beside = _filled(shape, region, within)
+    inside = (beside[shape.faces[:, 0]] == beside[shape.faces[:, 1]]) & (beside[shape.faces] >= 0).all(1)
+    curves |= within | inside & (shape.bend <= 2 * _BEND) | _chords(shape, facet | unsure, smooth)
     curves |= chords(vertices, shape, normals, region, smooth, ~smooth & ~curves)
-    return Facets(region, _filled(shape, region, within), smooth, _along_lines(shape, curves & ~smooth, ~smooth))
+    return Facets(region, beside, smooth, _along_lines(shape, curves & ~smooth, ~smooth))
 
 
 def _filled(shape: Chains, region: np.ndarray, within: np.ndarray) -> np.ndarray:
@@ -242,11 +244,12 @@ def _dangling(shape: Chains, edges: np.ndarray, facet: np.ndarray) -> np.ndarray
 def _unsure(shape: Chains, facet: np.ndarray) -> np.ndarray:
     """Triangles beside facets, and beside such ones, that are about as narrow; bool, shape (F,).
 
-    With them files fill what is left between curved surfaces. They may look anywhere, and are no plane faces of a part.
+    With them files fill what is left between curved surfaces. They may look anywhere, and are no plane faces of a part;
+    nor is a triangle of any size with facets on all three sides.
     """
     triangle = (np.bincount(shape.faces.ravel(), minlength=len(facet)) == 3) & ~facet
     narrow = shape.areas[shape.faces] <= _WIDER * shape.areas[shape.faces[:, ::-1]]
-    found = np.zeros(len(facet), bool)
+    found = triangle & (np.bincount(shape.faces.ravel(), facet[shape.faces[:, ::-1]].ravel(), len(facet)) == 3)
     while True:
         beside = (facet | found)[shape.faces[:, ::-1]] & narrow & triangle[shape.faces] & ~found[shape.faces]
         if not beside.any():
