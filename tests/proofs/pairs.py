@@ -21,6 +21,7 @@ from scenes import Measurand
 from scenes.errors import InvalidInput
 from scenes.parts import mesh, step
 from scenes.parts.solid import Solid
+from scenes.status import is_trusted
 from tests.cad_edges import SAME, Sharp, sharp_edges
 from validation import new_scene
 
@@ -226,29 +227,34 @@ def told_by(measurand: Measurand, names: dict[str, str]) -> Measurand | None:
     return Measurand(**said, features=features)
 
 
-def sigmas(exact: Path, tessellated: Path) -> dict[str, float]:
-    """Of what ``ice new`` proposes for the STEP file: sigma predicted for the mesh over that for it, at one setting."""
+def sigmas(exact: Path, tessellated: Path) -> tuple[dict[str, float], dict[str, str]]:
+    """Of what ``ice new`` proposes for the STEP file: sigma predicted for the mesh over that for it, at one setting.
+
+    Only of what may be relied on from both files; of the rest both statuses, where these differ.
+    """
     with tempfile.TemporaryDirectory() as folder:
         new = new_scene.written(exact, Path(folder) / "exact.toml", "mm")
         scene, look = new.scene, new.look
         other = new_scene.written(tessellated, Path(folder) / "mesh.toml", "mm").scene
     if look is None:
-        return {}
+        return {}, {}
     called = names(scene.solid, other.solid)
     pairs_ = [(each, told_by(each, called)) for each in look.measurands]
     known = [(one, two) for one, two in pairs_ if two is not None]
     if not known:
-        return {}
+        return {}, {}
     camera = scene.camera
     predicted = [
         planner.predict(each.with_(camera=camera, measurands=asked), look.sensor, look.light).measurands
         for each, asked in ((scene, [one for one, _ in known]), (other, [two for _, two in known]))
     ]
-    return {
-        one.name: float(np.sqrt(two.variance_object / one.variance_object))
-        for one, two in zip(*predicted, strict=True)
-        if one.variance_object and two.variance_object
-    }
+    ratios, other_statuses = {}, {}
+    for one, two in zip(*predicted, strict=True):
+        if is_trusted(one.status) and is_trusted(two.status):
+            ratios[one.name] = float(np.sqrt(two.variance_object / one.variance_object))
+        elif one.status != two.status:
+            other_statuses[one.name] = f"{one.status} and {two.status}"
+    return ratios, other_statuses
 
 
 def pairs(
@@ -272,10 +278,13 @@ def pairs(
             continue
         print(pair, flush=True)
         if sigma and pair.same and not pair.placed:
-            ratios = sigmas(exact, tessellated)
-            print("    sigma of the mesh over that of STEP: " + ", ".join(f"{n} {r:.4f}" for n, r in ratios.items()))
+            ratios, statuses = sigmas(exact, tessellated)
+            told = [f"{name} {ratio:.4f}" for name, ratio in ratios.items()]
+            told += [f"{name} {both}" for name, both in statuses.items()]
+            print("    sigma of the mesh over that of STEP: " + ", ".join(told), flush=True)
             totals["sigma compared"] += len(ratios)
             totals["sigma same"] += sum(abs(ratio - 1) <= SIGMA for ratio in ratios.values())
+            totals["statuses differ"] += len(statuses)
         if details:
             print(_details(pair))
         totals += _counted(pair)
@@ -299,7 +308,8 @@ def _total(totals: Counter[str]) -> str:
         told = name.replace("step_", "STEP ") if name.startswith("step") else f"STL {name}"
         lines.append("{}: {} of {} offered, {} that are none, {} in part".format(told, *counts))
     if totals["sigma compared"]:
-        lines.append(f"sigma within {SIGMA:.0%}: {totals['sigma same']} of {totals['sigma compared']}")
+        other = f"; of {totals['statuses differ']} more the statuses differ"
+        lines.append(f"sigma within {SIGMA:.0%}: {totals['sigma same']} of {totals['sigma compared']}{other}")
     return "\n".join(lines)
 
 
