@@ -1,4 +1,8 @@
-"""Which straight and circular sharp edges a STEP file has, asked of OpenCASCADE alone: an oracle of recognised ones."""
+"""Which straight and circular sharp edges a STEP file has, asked of OpenCASCADE alone: an oracle of recognised ones.
+
+Curves of other kinds (splines, ellipses, very short arcs) may be straight as nearly as features are compared: they
+need not be offered, and may be.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,7 @@ from scipy.spatial import KDTree
 
 TANGENT = math.radians(1.0)  # faces that meet at less join smoothly
 SAME = 1e-3  # mm
+_ALONG = 65  # places of a curve by which it is told where it runs
 _PLACES = (0.02, 0.25, 0.5, 0.75, 0.98)  # along an edge, where its faces' normals are asked
 
 
@@ -25,6 +30,10 @@ class Sharp:
     ----------
     lines : ndarray, shape (n, 2, 3)
         Ends of straight edges, those that continue each other joined.
+    nearly : ndarray, shape (l, 2, 3)
+        Ends of other sharp edges of which no place is farther than `SAME` off the line between the ends.
+    curves : ndarray, shape (c, p, 3)
+        Places along all other sharp edges.
     circles : ndarray, shape (m, 4)
         Centres and radii of whole circles.
     smooth : ndarray, shape (k, 2, 3)
@@ -34,6 +43,8 @@ class Sharp:
     """
 
     lines: np.ndarray
+    nearly: np.ndarray
+    curves: np.ndarray
     circles: np.ndarray
     smooth: np.ndarray
     bends: tuple[float, ...]
@@ -53,7 +64,7 @@ def sharp_edges(path: Path) -> Sharp:
     reader = STEPControl_Reader()
     reader.ReadFile(str(path))
     reader.TransferRoots()
-    lines, smooth, arcs, bends = [], [], [], []
+    lines, smooth, arcs, bends, curves = [], [], [], [], []
     for edge in _edges(reader.OneShape()):
         normals = [_normals(edge.curve[0], face) for face in edge.faces]
         angle = np.arctan2(np.linalg.norm(np.cross(*normals), axis=1), (normals[0] * normals[1]).sum(1))
@@ -62,14 +73,19 @@ def sharp_edges(path: Path) -> Sharp:
         ends = _points(edge.curve[1], (0.0, 1.0))
         if edge.kind == "line" or _is_straight(edge.curve[1]):
             (lines if is_sharp else smooth).append((ends, normals[0][[0, -1]], normals[1][[0, -1]]))
-        elif edge.kind == "circle" and is_sharp:
+            continue
+        if is_sharp:
+            curves.append(_points(edge.curve[1], tuple(np.linspace(0, 1, _ALONG))))
+        if edge.kind == "circle" and is_sharp:
             circle = edge.curve[1].Circle()
             turn = edge.curve[1].LastParameter() - edge.curve[1].FirstParameter()
             place, way = circle.Location(), circle.Axis().Direction()
             around = np.array([place.X(), place.Y(), place.Z(), circle.Radius()])
             arcs.append((around, np.array([way.X(), way.Y(), way.Z()]), turn))
-    bare = [ends for ends, *_ in smooth]
-    return Sharp(_joined(lines), _whole(arcs), np.array(bare).reshape(-1, 2, 3), tuple(bends))
+    bare = np.array([ends for ends, *_ in smooth]).reshape(-1, 2, 3)
+    nearly = np.array([points[[0, -1]] for points in curves if _off(points) <= SAME]).reshape(-1, 2, 3)
+    bent = np.array([points for points in curves if _off(points) > SAME]).reshape(-1, _ALONG, 3)
+    return Sharp(_joined(lines), nearly, bent, _whole(arcs), bare, tuple(bends))
 
 
 def _edges(shape: Any) -> list[_Edge]:
@@ -103,9 +119,14 @@ def _edges(shape: Any) -> list[_Edge]:
 def _is_straight(curve: Any) -> bool:
     """Whether a curve of another kind is straight, as boundaries of splines may be."""
     points = _points(curve, tuple(np.linspace(0, 1, 12)))
+    return _off(points) <= 1e-6 * np.linalg.norm(points[-1] - points[0])
+
+
+def _off(points: np.ndarray) -> float:
+    """How far the farthest of points (n, 3) is off the line from the first to the last; inf where that is none."""
     away = points - points[0]
     size = np.linalg.norm(away[-1])
-    return size > 0 and np.linalg.norm(np.cross(away, away[-1]), axis=1).max() <= 1e-6 * size**2
+    return float(np.linalg.norm(np.cross(away, away[-1]), axis=1).max() / size) if size > 0 else np.inf
 
 
 def _points(curve: Any, places: tuple[float, ...]) -> np.ndarray:

@@ -7,26 +7,29 @@ the difference has none of the noise of two renders' light between surfaces.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, maximum_filter
 
 from imaging.features.locator import edge_blur
 from imaging.geometry.lens import undistorted
 from imaging.geometry.looked_at import looked_at
 from imaging.light.between import light_of_dimmed
 from imaging.pictures import Pictures
+from render.surroundings import near_required
 from scenes import Picture
 
 _LEAST = 1e-6  # of the brightest pixel: less from other surfaces moves nothing
+_BLURRED = 6.0  # standard deviations: light of a pixel farther off is none
 _NEIGHBOURS, _RARELY = 1.5, 1e-6  # px, standard deviation: pixels that show no such face take after those beside them
 
 
 def of_one_surface(
     picture: Picture, renders: Sequence[np.ndarray], direct: Callable[[], np.ndarray], part: float
 ) -> np.ndarray | None:
-    """The first render with every surface reflecting less by a part.
+    """The first render with every surface reflecting less by a part, near what is measured.
 
     Parameters
     ----------
@@ -47,7 +50,7 @@ def of_one_surface(
     if part == 0 or scene.materials or scene.bright_floor is not None or scene.solid.curved:
         return None
     between = np.mean(renders, axis=0) - direct()
-    lent = np.argwhere(np.abs(between) > _LEAST * renders[0].max())
+    lent = np.argwhere((np.abs(between) > _LEAST * renders[0].max()) & _asked(picture, between.shape))
     faces, places = looked_at(picture, undistorted(lent[:, ::-1].astype(float), scene.camera))
     inner = (faces >= 0) & ~np.append(scene.bodies.outer, True)[faces]
     told = light_of_dimmed(Pictures.of(picture), part, places[inner], faces[inner])
@@ -57,6 +60,12 @@ def of_one_surface(
     once, least = (1 - part) ** 2, 1e-12 * max(float(before.max()), np.finfo(float).tiny)
     left = np.clip((after + once * least) / (before + least), (1 - part) ** 8, once)
     return (1 - part) * renders[0] + part * scene.noise.dark_level - (1 - part - left) * between
+
+
+def _asked(picture: Picture, shape: tuple[int, int]) -> np.ndarray:
+    """Pixels of an image that what is measured is found from, and those whose light is blurred into them; bool."""
+    near = near_required(picture, (slice(0, shape[0]), slice(0, shape[1])), 1)
+    return maximum_filter(near, 2 * math.ceil(_BLURRED * edge_blur(picture.scene.camera.blur_px)) + 1)
 
 
 def _seen(light: np.ndarray, pixels: np.ndarray, shape: tuple[int, ...], blur: float) -> np.ndarray:

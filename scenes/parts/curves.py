@@ -9,7 +9,8 @@ from scenes.parts.chains import Chains, components, pairs_of
 _CURVE = np.cos(np.radians(60))  # pieces of a curved edge turn by less
 LONGER = 4.0  # than the piece of a curve that it continues: a straight edge
 _FULL = 0.7  # of the turn before: where a straight edge begins it is half of it, at a last piece all
-_LAST = 1.5  # lengths of the piece before: a last piece
+_LAST, _HALVED = 1.5, 2.2  # lengths of the piece before: a last piece; that of even pieces
+_EVEN, _EQUAL = 0.05, 0.01  # of a length: even pieces; those of one length, as a straight edge is not by chance
 
 
 def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
@@ -17,7 +18,8 @@ def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
 
     They go on, turning a little, between the same surfaces, or through a vertex in which no other edge ends, for the
     surfaces on both sides are smooth there. A straight edge that continues a curve is much longer than its pieces; a
-    last piece without a facet beside it turns as much as those before.
+    last piece without a facet beside it turns as much as those before, and is about as long, or twice where these are
+    even: files divide a curve in halves until it is flat enough.
     """
     pairs, ends, alone = meetings(shape, open_)
     cosine, turn, straight = turns_at(shape, pairs, ends)
@@ -29,10 +31,15 @@ def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
     curved = (region[shape.faces[pairs]] >= 0).any(2)
     others = np.zeros((len(shape.bend), 2))  # turns at both ends of a piece, where no other edge ends
     others[pairs[alone], ends[alone]] = turn[alone, None]
+    lengths = np.zeros((len(shape.bend), 2))  # of what meets it there
+    lengths[pairs[alone], ends[alone]] = shape.length[pairs[alone][:, ::-1]]
     found = np.zeros(len(shape.bend), bool)
     for k in (0, 1):
-        full = curved[:, 1 - k] & (turn >= _FULL * others[pairs[:, 1 - k], 1 - ends[:, 1 - k]])
-        most = np.where(curved[:, k], LONGER, _LAST * full)
+        before = pairs[:, 1 - k], 1 - ends[:, 1 - k]
+        full = curved[:, 1 - k] & (turn >= _FULL * others[before])
+        uneven, unequal = (np.abs(each / length[:, 1 - k] - 1) for each in (lengths[before], length[:, k]))
+        even, equal = uneven <= _EVEN, np.maximum(uneven, unequal) <= _EQUAL
+        most = np.where(curved[:, k], LONGER, np.where(even, _HALVED, _LAST) * (full | equal & curved[:, 1 - k]))
         rows = turns & ((alike & curved[:, k]) | alone) & (length[:, k] <= most * length[:, 1 - k])
         found[pairs[rows, k]] = True
     return np.isin(run, run[found]) & open_

@@ -44,11 +44,14 @@ class Facets:
     ----------
     region : ndarray of int, shape (F,)
         Number of the curved surface that each face is a part of, -1 for plane faces.
+    beside : ndarray of int, shape (F,)
+        The same, with small triangles that fill what is left beside a curved surface as parts of it.
     smooth, rim : ndarray of bool, shape (C,)
         Chains inside a curved surface or where a plane continues it, and pieces of curved edges.
     """
 
     region: np.ndarray
+    beside: np.ndarray
     smooth: np.ndarray
     rim: np.ndarray
 
@@ -87,16 +90,26 @@ def facets(
     linked |= slight
     inner = linked & facet[shape.faces].all(1)
     smooth = around | flush | slight | inner | _continued(shape, linked & ~inner, inner)
-    smooth |= _dangling(shape, ~smooth)
+    smooth |= _dangling(shape, ~smooth, facet)
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, components(len(normals), joins), -1)
     curves = edging | curved(shape, region, ~smooth & ~edging)
     unsure = _unsure(shape, facet)
     within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
-    curves |= within | _chords(shape, facet | unsure, smooth)
+    beside = _filled(shape, region, within)
+    inside = (beside[shape.faces[:, 0]] == beside[shape.faces[:, 1]]) & (beside[shape.faces] >= 0).all(1)
+    curves |= within | inside & (shape.bend <= 2 * _BEND) | _chords(shape, facet | unsure, smooth)
     curves |= chords(vertices, shape, normals, region, smooth, ~smooth & ~curves)
-    return Facets(region, smooth, _along_lines(shape, curves & ~smooth, ~smooth))
+    return Facets(region, beside, smooth, _along_lines(shape, curves & ~smooth, ~smooth))
+
+
+def _filled(shape: Chains, region: np.ndarray, within: np.ndarray) -> np.ndarray:
+    """The curved surface of each face, and of what is joined to it by chains ``within``, (C,); int, shape (F,)."""
+    group = components(len(region), shape.faces[within])
+    found = np.full(group.max() + 1, -1)
+    np.maximum.at(found, group, region)
+    return np.where(region >= 0, region, found[group])
 
 
 def _flush(shape: Chains, pieces: list[list[int]], linked: np.ndarray) -> np.ndarray:
@@ -211,16 +224,18 @@ def _continued(shape: Chains, ends: np.ndarray, inner: np.ndarray) -> np.ndarray
     return ends & (shape.bend <= most * next_[shape.faces].max(1))
 
 
-def _dangling(shape: Chains, edges: np.ndarray) -> np.ndarray:
+def _dangling(shape: Chains, edges: np.ndarray, facet: np.ndarray) -> np.ndarray:
     """Which of the chains that may be edges end in the middle of a surface, or follow such ones; bool, shape (C,).
 
-    Only those that bend no more than the facets of a curve do: an edge ends where others do.
+    Only those that bend no more than the facets of a curve do: an edge ends where others do. Between two of the faces
+    that are a ``facet``, (F,), twice as much: so far do files turn a triangle over where they divide a surface badly.
     """
+    most = np.where(facet[shape.faces].all(1), 2 * _BEND, _BEND)
     left, size = edges.copy(), shape.ends.max(initial=0) + 1
     within = np.bincount(shape.ends.ravel(), minlength=size) > 2
     while True:
         alone = (np.bincount(shape.ends[left].ravel(), minlength=size) == 1) & within
-        loose = left & alone[shape.ends].any(1) & (shape.bend <= _BEND)
+        loose = left & alone[shape.ends].any(1) & (shape.bend <= most)
         if not loose.any():
             return edges & ~left
         left &= ~loose
@@ -229,11 +244,12 @@ def _dangling(shape: Chains, edges: np.ndarray) -> np.ndarray:
 def _unsure(shape: Chains, facet: np.ndarray) -> np.ndarray:
     """Triangles beside facets, and beside such ones, that are about as narrow; bool, shape (F,).
 
-    With them files fill what is left between curved surfaces. They may look anywhere, and are no plane faces of a part.
+    With them files fill what is left between curved surfaces. They may look anywhere, and are no plane faces of a part;
+    nor is a triangle of any size with facets on all three sides.
     """
     triangle = (np.bincount(shape.faces.ravel(), minlength=len(facet)) == 3) & ~facet
     narrow = shape.areas[shape.faces] <= _WIDER * shape.areas[shape.faces[:, ::-1]]
-    found = np.zeros(len(facet), bool)
+    found = triangle & (np.bincount(shape.faces.ravel(), facet[shape.faces[:, ::-1]].ravel(), len(facet)) == 3)
     while True:
         beside = (facet | found)[shape.faces[:, ::-1]] & narrow & triangle[shape.faces] & ~found[shape.faces]
         if not beside.any():

@@ -171,7 +171,7 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
     else:
         known = _told(told, mesh, group, chains, circular)
     circular = _edged(circular, chains, known.smooth)
-    whole = joined(vertices, chains, normals, known.region, known.kinds == "sharp")
+    whole = joined(vertices, chains, normals, known.beside, known.kinds == "sharp")
     pieces = [(chain, "sharp") for chain in whole]
     pieces += [(chain, kind) for chain, kind in zip(chains, known.kinds.tolist(), strict=True) if kind != "sharp"]
     used = np.unique([end for chain in chains for end in chain[0]])

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.parts.chains import SINGLE
+
 MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
 _STEP = 2 * np.sin(np.pi / MIN_SEGMENTS) / 2  # radii: half that of so many
 _WIDEST = 5.0  # of the middle step of a circle
-_ROUND = 1e-3  # of the radius: how far a circle's vertices may be off it
+_ROUND = 1e-4  # of the radius: how far a circle's vertices may be off it; more is another circle's
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +92,13 @@ def _area(points: np.ndarray, normal: np.ndarray) -> float:
 
 def rims(loops: list[list[tuple[int, ...]]], vertices: np.ndarray, normals: np.ndarray) -> list[Rim]:
     """The circles among the boundaries of faces."""
-    found = []
+    found, unsure = [], 2 * SINGLE * float(np.abs(vertices).max())
     for face, boundaries_ in enumerate(loops):
         for loop in boundaries_:
             if len(loop) >= MIN_SEGMENTS:
                 centre, radius, off = circle_through(vertices[list(loop)], normals[face])
                 steps = np.linalg.norm(np.roll(vertices[list(loop)], -1, 0) - vertices[list(loop)], axis=1) / radius
-                if off <= _ROUND * radius and stepped(steps):
+                if off <= _ROUND * radius + unsure and stepped(steps):
                     found.append(Rim(face, loop, centre, radius))
     return found
 

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
 from scenes.parts import mesh, step_kernel
+from scenes.parts.chains import components
 from scenes.parts.curved import Curved
 from scenes.parts.facets import Facets
 from scenes.parts.solid import Circle, Solid
@@ -130,17 +130,46 @@ class StepPart:
             there = known.get(tuple(owners[row].tolist()), [])
             smooth[row] = bool(there) and all(edge.bend < TANGENT for edge in there)
             straight[row] = any(edge.bend >= TANGENT and edge.holds(ends[row], near) for edge in there)
-        surface = self._continued[self.triangle_faces[of_faces]]
-        flat = np.array([isinstance(each, Plane) for each in self.surfaces])[self.triangle_faces[of_faces]]
-        return Facets(np.where(flat, -1, surface), smooth, ~smooth & ~straight)
+        straight[straight] = self._between_ends(ends[straight], near)
+        faces = self.triangle_faces[of_faces]
+        flat = np.array([isinstance(each, Plane) for each in self.surfaces])[faces]
+        several = self._smooth, self._smooth + self._coaxial(near)
+        region, beside = (np.where(flat, -1, components(len(self.surfaces), pairs)[faces]) for pairs in several)
+        return Facets(region, beside, smooth, ~smooth & ~straight)
+
+    def _between_ends(self, ends: np.ndarray, near: float) -> np.ndarray:
+        """Which chains (C, 2, 3) begin and end on sharp straight edges: one that goes on in a facet does not; (C,)."""
+        edges = [edge.ends for edge in self.edges if edge.straight and edge.bend >= TANGENT]
+        starts, stops = np.array(edges).reshape(-1, 2, 3).swapaxes(0, 1)
+        way = stops - starts
+        found = np.zeros(len(ends), bool)
+        for row, both in enumerate(ends):
+            away = both[:, None] - starts
+            along = np.clip((away * way).sum(-1) / np.maximum((way**2).sum(-1), np.finfo(float).tiny), 0, 1)
+            aside = np.linalg.norm(away - along[..., None] * way, axis=-1)
+            found[row] = bool((aside.min(1) <= near).all())
+        return found
 
     @cached_property
-    def _continued(self) -> np.ndarray:
-        """A number for each face, the same for curved ones that continue each other smoothly, shape (F,)."""
+    def _smooth(self) -> list[tuple[int, int]]:
+        """Pairs of curved faces that continue each other smoothly."""
         curved = [not isinstance(surface, Plane) for surface in self.surfaces]
-        pairs = [e.faces[:2] for e in self.edges if e.bend < TANGENT and all(curved[f] for f in e.faces[:2])]
-        graph = coo_array((np.ones(len(pairs)), np.array(pairs, int).reshape(-1, 2).T), shape=(len(curved),) * 2)
-        return connected_components(graph, directed=False)[1]
+        return [e.faces[:2] for e in self.edges if e.bend < TANGENT and all(curved[f] for f in e.faces[:2])]
+
+    def _coaxial(self, near: float) -> list[tuple[int, int]]:
+        """Pairs of faces of one cylinder, though they touch in a point alone or nowhere."""
+        known = {f: each for f, each in enumerate(self.surfaces) if isinstance(each, Cylinder)}
+        if len(known) < 2:
+            return []
+        size = float(np.ptp(self.triangles.reshape(-1, 3), axis=0).max())
+        numbers = [
+            [*(each.point - (each.point @ each.axis) * each.axis), *(size * way * each.axis), each.radius, each.hollow]
+            for way in (1, -1)
+            for each in known.values()
+        ]
+        walls = list(known)
+        pairs = KDTree(np.array(numbers, float)).query_pairs(near, p=np.inf)
+        return [(walls[i % len(walls)], walls[k % len(walls)]) for i, k in pairs]
 
     @cached_property
     def curved(self) -> tuple[Curved, ...]:

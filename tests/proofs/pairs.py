@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import tempfile
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,10 +21,12 @@ from scenes import Measurand
 from scenes.errors import InvalidInput
 from scenes.parts import mesh, step
 from scenes.parts.solid import Solid
+from scenes.status import is_trusted
 from tests.cad_edges import SAME, Sharp, sharp_edges
 from validation import new_scene
 
 SIGMA = 0.01  # of a standard deviation
+_ALONG = 33  # places of an offered edge that are asked whether they lie on one
 _SAME_PART = 0.98  # of the corners of its sharp edges: those of another revision are elsewhere
 
 
@@ -40,33 +42,73 @@ class Match:
         Those that are not.
     false : ndarray, shape (n, ...)
         Offered ones that are none.
+    part : ndarray, shape (m, ...)
+        Offered ones that lie on a straight edge and end elsewhere: halves, or a little of a curve that continues it.
     """
 
     there: int
     matched: int
     missed: np.ndarray
     false: np.ndarray
+    part: np.ndarray
 
     def __str__(self) -> str:
-        return f"{self.matched} of {self.there}, {len(self.false)} false"
+        part = f", {len(self.part)} in part" if len(self.part) else ""
+        return f"{self.matched} of {self.there}, {len(self.false)} false{part}"
 
 
 def matched(there: np.ndarray, offered: np.ndarray, signs: np.ndarray | None = None) -> Match:
     """Features (n, k) and (m, k) that differ by at most `SAME` in each number; ``signs`` (k,) make the same one."""
     if not len(there) or not len(offered):
-        return Match(len(there), 0, there, offered)
+        return Match(len(there), 0, there, offered, offered[:0])
     both = offered if signs is None else np.concatenate([offered, offered * signs])
     near = KDTree(both).query(there, p=np.inf)
     found = near[0] <= SAME
     taken = np.zeros(len(offered), bool)
     taken[near[1][found] % len(offered)] = True
-    return Match(len(there), int(found.sum()), there[~found], offered[~taken])
+    return Match(len(there), int(found.sum()), there[~found], offered[~taken], offered[:0])
 
 
 def matched_lines(there: np.ndarray, offered: np.ndarray) -> Match:
     """Straight edges (n, 2, 3) and (m, 2, 3): their middles, and half their way from either end."""
     numbers = [np.concatenate([ends.mean(1), (ends[:, 1] - ends[:, 0]) / 2], 1) for ends in (there, offered)]
     return matched(*numbers, np.repeat([1.0, -1.0], 3))
+
+
+def compared_lines(there: Sharp, turn: np.ndarray, shift: np.ndarray, found: np.ndarray) -> Match:
+    """Straight edges (m, 2, 3) that are offered beside those of a part, turned and shifted.
+
+    None are those that lie on no straight edge: edges that are straight within `SAME` may be offered.
+    """
+    lines, nearly, curves = (each @ turn.T + shift for each in (there.lines, there.nearly, there.curves))
+    match = matched_lines(lines, found)
+    left = matched_lines(nearly, _ends(match.false)).false
+    straight = np.concatenate([lines, nearly])
+    part = np.array([_lies_on(ends, straight, curves) for ends in _ends(left)], bool)
+    return replace(match, false=left[~part], part=left[part])
+
+
+def _ends(rows: np.ndarray) -> np.ndarray:
+    """Ends (n, 2, 3) of edges by their middles and half their ways (n, 6)."""
+    return np.stack([rows[:, :3] - rows[:, 3:], rows[:, :3] + rows[:, 3:]], 1)
+
+
+def _lies_on(ends: np.ndarray, straight: np.ndarray, curves: np.ndarray) -> bool:
+    """Whether a line (2, 3) lies on edges of a part, and for most of its length on straight ones."""
+    places = ends[0] + np.linspace(0, 1, _ALONG)[:, None] * (ends[1] - ends[0])
+    on = _near(places, straight)
+    pieces = np.stack([curves[:, :-1], curves[:, 1:]], 2).reshape(-1, 2, 3)
+    return bool((on | _near(places, pieces)).all() and on.mean() > 0.5)
+
+
+def _near(places: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Which places (n, 3) are no farther than `SAME` from one of lines (m, 2, 3); bool, (n,)."""
+    if not len(lines):
+        return np.zeros(len(places), bool)
+    way = lines[:, 1] - lines[:, 0]
+    away = places[:, None] - lines[:, 0]
+    along = np.clip((away * way).sum(-1) / np.maximum((way**2).sum(-1), 1e-300), 0, 1)
+    return np.linalg.norm(away - along[..., None] * way, axis=-1).min(1) <= SAME
 
 
 def offered(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
@@ -79,6 +121,8 @@ def offered(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
 def moved(there: Sharp, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Turn (3, 3) by right angles and shift (3,) that bring a file's edges to the corners of a mesh, and how many."""
     ends = there.lines.reshape(-1, 3)
+    if not len(ends):
+        return np.eye(3), np.zeros(3), 1.0
     tree, best = KDTree(corners), (np.eye(3), np.zeros(3), -1.0)
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1, -1), repeat=3):
@@ -131,7 +175,6 @@ def compared(exact: Path, tessellated: Path) -> Pair:
     lines, circles = offered(step.read(exact).solid)
     solid = mesh.read(tessellated)
     turn, shift, share = moved(there, solid.triangles.reshape(-1, 3))
-    there_lines = there.lines @ turn.T + shift
     there_circles = np.concatenate([there.circles[:, :3] @ turn.T + shift, there.circles[:, 3:]], 1)
     found = offered(solid)
     placed = "" if np.array_equal(turn, np.eye(3)) and not shift.any() else " (elsewhere)"
@@ -139,9 +182,9 @@ def compared(exact: Path, tessellated: Path) -> Pair:
         exact.stem,
         share,
         placed,
-        matched_lines(there.lines, lines),
+        compared_lines(there, np.eye(3), np.zeros(3), lines),
         matched(there.circles, circles),
-        matched_lines(there_lines, found[0]),
+        compared_lines(there, turn, shift, found[0]),
         matched(there_circles, found[1]),
     )
 
@@ -184,29 +227,34 @@ def told_by(measurand: Measurand, names: dict[str, str]) -> Measurand | None:
     return Measurand(**said, features=features)
 
 
-def sigmas(exact: Path, tessellated: Path) -> dict[str, float]:
-    """Of what ``ice new`` proposes for the STEP file: sigma predicted for the mesh over that for it, at one setting."""
+def sigmas(exact: Path, tessellated: Path) -> tuple[dict[str, float], dict[str, str]]:
+    """Of what ``ice new`` proposes for the STEP file: sigma predicted for the mesh over that for it, at one setting.
+
+    Only of what may be relied on from both files; of the rest both statuses, where these differ.
+    """
     with tempfile.TemporaryDirectory() as folder:
         new = new_scene.written(exact, Path(folder) / "exact.toml", "mm")
         scene, look = new.scene, new.look
         other = new_scene.written(tessellated, Path(folder) / "mesh.toml", "mm").scene
     if look is None:
-        return {}
+        return {}, {}
     called = names(scene.solid, other.solid)
     pairs_ = [(each, told_by(each, called)) for each in look.measurands]
     known = [(one, two) for one, two in pairs_ if two is not None]
     if not known:
-        return {}
+        return {}, {}
     camera = scene.camera
     predicted = [
         planner.predict(each.with_(camera=camera, measurands=asked), look.sensor, look.light).measurands
         for each, asked in ((scene, [one for one, _ in known]), (other, [two for _, two in known]))
     ]
-    return {
-        one.name: float(np.sqrt(two.variance_object / one.variance_object))
-        for one, two in zip(*predicted, strict=True)
-        if one.variance_object and two.variance_object
-    }
+    ratios, other_statuses = {}, {}
+    for one, two in zip(*predicted, strict=True):
+        if is_trusted(one.status) and is_trusted(two.status):
+            ratios[one.name] = float(np.sqrt(two.variance_object / one.variance_object))
+        elif one.status != two.status:
+            other_statuses[one.name] = f"{one.status} and {two.status}"
+    return ratios, other_statuses
 
 
 def pairs(
@@ -230,10 +278,13 @@ def pairs(
             continue
         print(pair, flush=True)
         if sigma and pair.same and not pair.placed:
-            ratios = sigmas(exact, tessellated)
-            print("    sigma of the mesh over that of STEP: " + ", ".join(f"{n} {r:.4f}" for n, r in ratios.items()))
+            ratios, statuses = sigmas(exact, tessellated)
+            told = [f"{name} {ratio:.4f}" for name, ratio in ratios.items()]
+            told += [f"{name} {both}" for name, both in statuses.items()]
+            print("    sigma of the mesh over that of STEP: " + ", ".join(told), flush=True)
             totals["sigma compared"] += len(ratios)
             totals["sigma same"] += sum(abs(ratio - 1) <= SIGMA for ratio in ratios.values())
+            totals["statuses differ"] += len(statuses)
         if details:
             print(_details(pair))
         totals += _counted(pair)
@@ -245,7 +296,7 @@ def _counted(pair: Pair) -> Counter[str]:
     for name in ("step_lines", "step_circles", "lines", "circles"):
         match = getattr(pair, name)
         if pair.same or name.startswith("step"):
-            facts = {"there": match.there, "matched": match.matched, "false": len(match.false)}
+            facts = {"there": match.there, "matched": match.matched, "false": len(match.false), "part": len(match.part)}
             found += Counter({f"{name} {key}": count for key, count in facts.items()})
     return found
 
@@ -253,11 +304,12 @@ def _counted(pair: Pair) -> Counter[str]:
 def _total(totals: Counter[str]) -> str:
     lines = [f"{totals['pairs']} pairs, {totals['same']} of the same revision, {totals['refused']} refused"]
     for name in ("step_lines", "step_circles", "lines", "circles"):
-        counts = [totals[f"{name} {key}"] for key in ("matched", "there", "false")]
+        counts = [totals[f"{name} {key}"] for key in ("matched", "there", "false", "part")]
         told = name.replace("step_", "STEP ") if name.startswith("step") else f"STL {name}"
-        lines.append("{}: {} of {} offered, {} that are none".format(told, *counts))
+        lines.append("{}: {} of {} offered, {} that are none, {} in part".format(told, *counts))
     if totals["sigma compared"]:
-        lines.append(f"sigma within {SIGMA:.0%}: {totals['sigma same']} of {totals['sigma compared']}")
+        other = f"; of {totals['statuses differ']} more the statuses differ"
+        lines.append(f"sigma within {SIGMA:.0%}: {totals['sigma same']} of {totals['sigma compared']}{other}")
     return "\n".join(lines)
 
 
@@ -265,7 +317,7 @@ def _details(pair: Pair) -> str:
     told = []
     for name in ("step_lines", "step_circles", "lines", "circles"):
         match = getattr(pair, name)
-        for kind in ("missed", "false"):
+        for kind in ("missed", "false", "part"):
             for row in getattr(match, kind)[:40]:
                 told.append(f"    {name} {kind}: " + ", ".join(f"{x:.4f}" for x in row))
     return "\n".join(told)

@@ -15,6 +15,7 @@ from render.between import lent_to
 from scenes import Picture, Scene
 from tests.parts import newcomers
 from tests.step_parts import flange, written
+from validation import dimmed
 from validation.dimmed import of_one_surface
 
 
@@ -99,7 +100,7 @@ def test_what_is_left_of_light_that_met_two_surfaces_or_more(picture):
 
 
 def test_one_surface_reflects_less_by_what_its_light_has_met(picture, monkeypatch):
-    """Direct light less by a tenth, other light by what closed form tells."""
+    """Direct light less by a tenth, other light by what closed form tells, which is asked near what is measured."""
     scene = picture.scene
     height, width, dark = scene.camera.height, scene.camera.width, scene.noise.dark_level
     direct = np.full((height, width), dark + 50.0)
@@ -107,14 +108,20 @@ def test_one_surface_reflects_less_by_what_its_light_has_met(picture, monkeypatc
     y, x = np.mgrid[:height, :width]
     faces, _ = looked_at(picture, np.stack([x, y], -1).reshape(-1, 2).astype(float))
     inner = ((faces >= 0) & ~np.append(scene.bodies.outer, True)[faces]).reshape(height, width)
-    assert inner.any()
+    near = inner & dimmed._asked(picture, (height, width))
+    assert 0 < near.sum() < inner.sum()
     render[inner] += 8.0
-    monkeypatch.setattr(
-        "validation.dimmed.light_of_dimmed", lambda *_: (np.full(inner.sum(), 8.0), np.full(inner.sum(), 0.7 * 8.0))
-    )
+    asked = []
+
+    def told(_, part, points, faces):
+        asked.append(len(points))
+        return np.full(len(points), 8.0), np.full(len(points), 0.7 * 8.0)
+
+    monkeypatch.setattr("validation.dimmed.light_of_dimmed", told)
     found = of_one_surface(picture, (render,), lambda: direct, 0.1)
     assert found[~inner] == pytest.approx(render[~inner] - 5.0)
-    assert found[inner] == pytest.approx(render[inner] - 5.0 - 0.3 * 8.0, abs=1e-6)
+    assert found[near] == pytest.approx(render[near] - 5.0 - 0.3 * 8.0, abs=1e-6)
+    assert asked == [near.sum()]
 
 
 def test_other_scenes_are_rendered(picture):

@@ -9,8 +9,8 @@ import trimesh
 import scenes
 from imaging.blurred import boundaries
 from imaging.pictures import Pictures
-from scenes.parts import mesh, rims
-from scenes.parts.chains import SINGLE
+from scenes.parts import cones, mesh, rims
+from scenes.parts.chains import SINGLE, Chains
 from scenes.parts.cones import Axial
 from scenes.parts.joined import joined
 from scenes.parts.recognised import cylinders
@@ -123,7 +123,7 @@ def test_one_chord_for_a_curve_on_a_cone_is_no_straight_edge(aside, straight):
 
 @pytest.mark.parametrize("slope", [0.0, -0.02, 0.3, 2.0])
 def test_a_cone_or_cylinder_through_places_in_single_precision(rng, slope):
-    """50 places on two thirds of a turn; the middles of chords are off it. Too few, or of a plane, tell none."""
+    """50 places on two thirds of a turn; the middles of chords are off it. Too few tell none."""
     turn, along = rng.uniform(0, 4, 50), rng.uniform(-1, 1, 50)
     frame = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     outward = np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
@@ -134,15 +134,52 @@ def test_a_cone_or_cylinder_through_places_in_single_precision(rng, slope):
     unsure = 2 * SINGLE * np.abs(points).max()
     assert np.abs(found.off(points)).max() < unsure / 2
     assert abs(found.axis @ frame[:, 2]) == pytest.approx(1, abs=1e-9)
-    assert abs(found.slope) == pytest.approx(abs(slope), abs=1e-5)  # margin: of single precision
-    assert found.radius + found.slope * found.axis @ ([20, -5, 3] - found.point) == pytest.approx(7, abs=1e-5)
+    assert abs(np.tan(found.angle)) == pytest.approx(abs(slope), abs=1e-5)  # margin: of single precision
+    here = found.axis @ ([20, -5, 3] - found.point)
+    assert found.apart / np.cos(found.angle) + np.tan(found.angle) * here == pytest.approx(7, abs=1e-5)
     apart = np.arange(50) != np.argsort(turn)[::-1]
     chords = (points + points[np.argsort(turn)[::-1]])[apart] / 2
     assert (found.off(chords) < unsure / 2).all()
     assert np.median(found.off(chords)) < -0.1
-    assert Axial.through(points[:9], normals[:9]) is None
-    flat = np.column_stack([rng.uniform(-1, 1, (30, 2)), np.zeros(30)])
-    assert Axial.through(flat, np.tile([0, 0, 1.0], (30, 1))) is None
+    assert Axial.through(points[:7], normals[:7]) is None
+
+
+@pytest.mark.parametrize(("slope", "turn", "is_chord"), [(18.1, 0.05, True), (18.1, 0.002, False), (1e9, 0.05, False)])
+def test_a_chord_of_a_cone_nearly_flat_is_told_from_a_narrow_piece_of_it(slope, turn, is_chord):
+    """A plane 20 from the axis cuts a slope of 3 degrees 0.0014 below its chord, if that is 2 wide; a plane has none.
+
+    The piece is 9 long and as wide, which tells the cone ill, and where the chord's middle should be well.
+    """
+    angle = np.array([-1.0, -0.5, 0.5, 1.0] * 2 + [0.0]) * turn
+    radius = np.array([20 / np.cos(angle[:4]), np.full(4, 11.0)]).ravel().tolist() + [11.0]
+    outward = np.stack([np.cos(angle), np.sin(angle), 0 * angle], -1)
+    corners = outward * np.array(radius)[:, None] + [0, 0, 1.0] * (9 - np.array(radius)[:, None] / slope)
+    normals = (outward / slope + [0, 0, 1.0]) / np.hypot(1, 1 / slope)
+    single = SINGLE * np.abs(corners).max()
+    corners = corners.astype(np.float32).astype(float)
+    told = cones._beside(corners, normals, corners[[[0, 3]]], single)
+    assert (told is not None and bool(told[0])) == is_chord
+
+
+def test_chords_are_told_by_the_facets_next_to_them_where_a_surface_goes_on_as_another():
+    """Ten facets of a cylinder that goes on smoothly, as files tell it, in facets that lie on none."""
+    turn, count = np.linspace(0, 1, 11), 10
+    ring = np.stack([5 * np.cos(turn), 5 * np.sin(turn), 0 * turn], -1)
+    vertices = np.concatenate([ring, ring + [0, 0, 3.0], [[9, 9, 0], [8, 9.7, 1.7]]])
+    middle = (turn[1:] + turn[:-1]) / 2
+    normals = np.stack([np.cos(middle), np.sin(middle), 0 * middle], -1)
+    normals = np.concatenate(
+        [normals, [[np.cos(1.25), np.sin(1.25), 0], [0, 0, -1.0]]]
+    )  # what goes on, and the plane below
+    rulings = [((i + 1, i + 12), (i, i + 1), True) for i in range(count)]
+    borders = [((i, i + 1), (i, 11), True) for i in range(count)]
+    beyond = [((22, 23), (10, 11), True)]
+    chains = rulings + borders + beyond
+    shape = Chains.of(vertices, chains, normals, np.full(12, 1.5))
+    smooth = np.arange(len(chains)) < count
+    region = np.array([0] * 11 + [-1])
+    found = cones.chords(vertices, shape, normals, region, smooth, ~smooth)
+    assert found.tolist() == [False] * count + [True] * count + [False]
 
 
 def test_pieces_are_joined_between_the_same_surfaces_alone():

@@ -56,6 +56,24 @@ def test_a_last_piece_beside_planes_is_as_long_and_turns_as_much_as_those_before
     assert pieces(lengths[::-1], turns[::-1], walls[::-1]) == [found] + [True] * 4
 
 
+@pytest.mark.parametrize(
+    ("before", "length", "turn", "found"),
+    [
+        (1.04, 2.15, 4.8, True),
+        (1.04, 2.25, 4.8, False),
+        (1.06, 2.15, 4.8, False),
+        (1.04, 2.15, 4.1, False),
+        (1.005, 1.005, 3.2, True),
+        (1.005, 1.015, 3.2, False),
+        (1.015, 1.005, 3.2, False),
+    ],
+)
+def test_a_curve_in_even_pieces_ends_in_one_of_twice_their_length_or_of_the_same(before, length, turn, found):
+    """Twice as long where it turns by 0.7 of the turn before, as a straight edge does not; as long however it turns."""
+    lengths, turns, walls = [1.2, 1.3, before, 1.0, length], [6.0, 6.0, 6.0, turn], [0, 0, 0, 0, -1]
+    assert pieces(lengths, turns, walls) == [True] * 4 + [found]
+
+
 @pytest.mark.parametrize(("turn", "found"), [(59.0, True), (61.0, False)])
 def test_pieces_that_turn_by_60_degrees_are_none_of_a_curve(turn, found):
     assert pieces([1.0, 1.2, 1.1], [turn, turn], [0, 0, 0]) == [found] * 3

@@ -62,6 +62,14 @@ def test_round_boundaries_of_twelve_pieces_are_circles():
     assert found[0].pieces == [*zip(range(11), range(1, 12), strict=True), (11, 0)]
 
 
+@pytest.mark.parametrize(("step", "count"), [(0.0, 1), (0.0015, 1), (0.0044, 0)])
+def test_two_arcs_of_nearly_one_radius_are_no_circle(step, count):
+    """Half circles of 19.5 and of 1e-4 of it more, or 2e-4: vertices of one circle are as near as a file holds them."""
+    loop = np.concatenate([ring(72, 19.5)[:37], ring(72, 19.5 + step)[36:], ring(72, 19.5 + step)[:1]])
+    found = rims.rims([[tuple(range(len(loop)))]], loop, np.array([[0.0, 0, 1]]))
+    assert len(found) == count
+
+
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (-2 / 3, 1 / 3, 2 / 3)])
 def test_a_circle_through_points_of_any_plane(normal):
     """And how far the farthest and the nearest one are apart in radius."""
@@ -256,12 +264,32 @@ def test_what_a_bend_is_sure_of_is_less_by_what_single_precision_moves_a_sliver(
     assert (shape.unsure, shape.length.tolist()) == (pytest.approx(2 * one), [200.0, 200.0, 1.0])
 
 
-@pytest.mark.parametrize(("bend", "smooth", "loose"), [(30.9, 2, True), (31.1, 2, False), (20.0, 1, False)])
-def test_an_edge_that_ends_within_a_surface_is_none_and_neither_is_what_it_follows(bend, smooth, loose):
-    """Where at least two smooth pieces meet it; not one that bends by more than 31 degrees."""
+@pytest.mark.parametrize(
+    ("bend", "smooth", "of_surface", "loose"),
+    [
+        (30.9, 2, False, True),
+        (31.1, 2, False, False),
+        (61.9, 2, True, True),
+        (62.1, 2, True, False),
+        (20.0, 1, False, False),
+    ],
+)
+def test_an_edge_that_ends_within_a_surface_is_none_and_neither_is_what_it_follows(bend, smooth, of_surface, loose):
+    """Where at least two smooth pieces meet it; not one that bends by more than 31 degrees, 62 between facets."""
     within = [(1, 10), (1, 11)][:smooth]  # at one end of the first edge
     edges = [(0, 1), (0, 2), (2, 3), (2, 4)]  # a way of two, which ends where two others meet
     ends = np.array([*edges, *within, (0, 12), (0, 13)])
-    shape = SimpleNamespace(ends=ends, bend=np.radians([bend, 25.0, 40.0, 40.0] + [5.0] * (len(ends) - 4)))
-    kept = facets._dangling(shape, np.arange(len(ends)) < 4)
+    shape = SimpleNamespace(
+        ends=ends,
+        bend=np.radians([bend, 25.0, 40.0, 40.0] + [5.0] * (len(ends) - 4)),
+        faces=np.array([[0, 1]] + [[1, 2]] * (len(ends) - 1)),
+    )
+    kept = facets._dangling(shape, np.arange(len(ends)) < 4, np.array([of_surface] * 2 + [False]))
     assert kept.tolist() == [loose, loose] + [False] * (len(ends) - 2)
+
+
+def test_small_triangles_beside_a_curved_surface_are_parts_of_it():
+    """Faces 1 and 2 fill what is left beside facet 0; 3 is a plane, 4 another surface's."""
+    shape = sides([(0, 1), (1, 2), (2, 3), (3, 4)], np.eye(3)[[0, 0, 0, 0]])
+    filled = facets._filled(shape, np.array([7, -1, -1, -1, 8]), np.array([True, True, False, False]))
+    assert filled.tolist() == [7, 7, 7, -1, 8]

@@ -119,13 +119,36 @@ def test_features_are_matched_one_to_one_to_a_micrometre():
     assert pairs.matched_lines(ends, np.zeros((0, 2, 3))).missed is not None
 
 
+def sharp(lines, nearly=np.zeros((0, 2, 3)), curves=np.zeros((0, 9, 3))):
+    """Edges of a part."""
+    return Sharp(lines, nearly, curves, np.zeros((0, 4)), np.zeros((0, 2, 3)), ())
+
+
+def test_what_lies_on_a_straight_edge_is_none_that_there_is_not():
+    """An edge, half of it, and it with a bit of the circle of radius 100 that continues it; a spline that is straight.
+
+    Beside the edge by 0.002, and the circle's first chord, are none that there are.
+    """
+    turn = np.linspace(0, 0.1, 65)
+    circle = np.stack([10 + 100 * np.sin(turn), 100 - 100 * np.cos(turn), 0 * turn], -1)
+    spline = np.array([[[0.0, 5, 0], [1, 5, 0]]])
+    there = sharp(np.array([[[0.0, 0, 0], [10, 0, 0]]]), spline, circle[None])
+    ends = np.array([[0, 10, 0], [0, 5, 0], [0, 10.4, 0], [0, 10, 0.002], [10, 11, 0]], float)
+    lines = np.stack([np.stack([ends[:, k], ends[:, 2], 0 * ends[:, 0]], -1) for k in (0, 1)], 1)
+    lines = np.concatenate([lines, spline, circle[None, [0, 1]]])
+    found = pairs.compared_lines(there, np.eye(3), np.zeros(3), lines)
+    assert (found.there, found.matched, len(found.part), len(found.false)) == (1, 1, 2, 3)
+    assert found.part[:, 0] == pytest.approx([2.5, 5.2])
+    assert str(found) == "1 of 1, 3 false, 2 in part"
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_mesh_that_stands_elsewhere_is_found(rng, turned):
     """Turned by right angles and moved until its corners are those of the edges; of another part few are."""
     corners = rng.uniform(0, 10, (40, 3)) * [1, 2, 3]
     turn = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]) if turned else np.eye(3)
     shift = np.array([5.0, -2, 1]) if turned else np.zeros(3)
-    there = Sharp(corners.reshape(-1, 2, 3), np.zeros((0, 4)), np.zeros((0, 2, 3)), ())
+    there = sharp(corners.reshape(-1, 2, 3))
     found = pairs.moved(there, corners @ turn.T + shift)
     assert found[0] == pytest.approx(turn)
     assert found[1] == pytest.approx(shift)
