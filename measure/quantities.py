@@ -26,6 +26,7 @@ from measure.features.shape import find_shape
 from measure.goodness import WORST
 from scenes import Corner, Picture, Quantity, status
 from scenes.measurands.between import Crossing
+from scenes.measurands.kinds import MEASURANDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,6 +288,8 @@ def _states(known: Measurands, shape: Shape, circles: tuple[Circles, ...], forms
         columns += [_crossing(shape, names, each) for each in quantity.crossings]
         if any(name in names for name in quantity.edges):
             columns.append(shape.whole)
+        if MEASURANDS[quantity.kind].pictures > 1:
+            columns.append(np.full(len(found), status.AMBIGUOUS))
         if quantity in forms:  # an edge that is not straight does not fit a line: that is what is measured
             columns = [np.where(each == status.MISFIT, status.OK, each) for each in columns]
             columns.append(forms[quantity].state)

@@ -12,6 +12,7 @@ from imaging.features.measurand import required_edges
 from imaging.features.projected_edges import projected_edges
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
+from planner.bundles import BundlePrediction, predict_bundle
 from planner.combining import Combination, combine
 from planner.constraints import Constraints
 from planner.covering import Coverage, coverage
@@ -49,9 +50,46 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
-    "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "Coverage",
-    "EdgePrediction", "Forecast", "Map", "NothingMeasuresAll", "Pictures", "Plan", "Prediction", "Robust",
-    "SceneBudget", "Tolerances", "Varied", "View", "ViewSet", "ViewingSpace", "Views", "budget", "combine",
-    "coverage", "exhaustive", "image", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "predict",
-    "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
+    "Aim",
+    "BundlePrediction",
+    "Candidate",
+    "CapabilityPlan",
+    "Choice",
+    "Chosen",
+    "Combination",
+    "Constraints",
+    "Coverage",
+    "EdgePrediction",
+    "Forecast",
+    "Map",
+    "NothingMeasuresAll",
+    "Pictures",
+    "Plan",
+    "Prediction",
+    "Robust",
+    "SceneBudget",
+    "Tolerances",
+    "Varied",
+    "View",
+    "ViewSet",
+    "ViewingSpace",
+    "Views",
+    "budget",
+    "combine",
+    "coverage",
+    "exhaustive",
+    "image",
+    "plan",
+    "plan_capability",
+    "plan_views",
+    "pose_map",
+    "pose_scatter",
+    "predict",
+    "predict_bundle",
+    "projected_edges",
+    "required_edges",
+    "robust",
+    "variance_map",
+    "variances",
+    "with_choice",
 ]  # fmt: skip

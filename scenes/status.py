@@ -51,7 +51,7 @@ REMEDIES = {
     SIGN_CHANGE: "move the lamp until the same side is the brighter one along all of the edge",
     LOW_CONTRAST: "move the lamp, expose longer, or choose another edge",
     ILL_CONDITIONED: "turn the camera, or choose edges that meet at a larger angle",
-    AMBIGUOUS: "give a start nearer to the true pose, or show one more feature",
+    AMBIGUOUS: "give a start nearer to the true pose, show one more feature, or measure several pictures together",
     COMPRESSED: "save pictures without compression (PNG, TIFF)",
     CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
     UNPLACED: "name datums that lie farther apart or at other heights, turn the camera, or say the part's place more "

@@ -1,1 +1,1 @@
-"""Several pictures of one part adjusted together (bundle adjustment): its features in space, and where the sensors are."""
+"""Several pictures of one part adjusted together (bundle adjustment): its features in space, and the sensors' places."""

@@ -88,6 +88,11 @@ class InSpace:
         left[:, 2] *= np.sign(np.linalg.det(left @ right))
         return replace(self, turned=left @ right)
 
+    def laid(self) -> np.ndarray:
+        """The places (p, 3), shifted so that their middle is the model's."""
+        there, here = replace(self, numbers=np.zeros(len(self.numbers)), turned=np.eye(3)).places(), self.places()
+        return here + there.mean(0) - here.mean(0)
+
     def places(self) -> np.ndarray:
         """Of all vertices and centres, (p, 3)."""
         points = [self._vertex(vertex).at for vertex in self.unknowns.vertices]
@@ -112,4 +117,3 @@ class InSpace:
 def _moves(basis: np.ndarray) -> dict[int, np.ndarray]:
     """Derivatives (3,) by the unknowns by which there are some, of a basis (3, n)."""
     return {int(k): basis[:, k] for k in np.flatnonzero(basis.any(0))}
-

@@ -68,7 +68,9 @@ class Told:
 
     def is_told(self, functions: np.ndarray) -> np.ndarray:
         """Which functions (M, n) of the unknowns the rows tell, bool (M,)."""
-        return np.linalg.norm(self.left(functions), axis=-1) <= _CHANGES * np.linalg.norm(self._in_units(functions), axis=-1)
+        return np.linalg.norm(self.left(functions), axis=-1) <= _CHANGES * np.linalg.norm(
+            self._in_units(functions), axis=-1
+        )
 
     def left(self, functions: np.ndarray) -> np.ndarray:
         """The part of functions (M, n) that lies along open directions, (M, n), in those units."""

@@ -68,7 +68,9 @@ class Freedom:
         if not isinstance(self.sensors, tuple):
             return (self.sensors,) * count
         if len(self.sensors) != count:
-            raise InvalidInput(f"sensors must be one for all, or one for each of {count} pictures, got {len(self.sensors)}")
+            raise InvalidInput(
+                f"sensors must be one for all, or one for each of {count} pictures, got {len(self.sensors)}"
+            )
         return self.sensors
 
 

@@ -99,6 +99,14 @@ class Seen:
         first = 2 * len(self.names) + sum(self.sizes[:c])
         return slice(first, first + self.sizes[c])
 
+    def of_features(self, some: np.ndarray) -> np.ndarray:
+        """Which parameters, bool (q,), are those of some edges and circles, bool (E + C,)."""
+        which, edges = np.zeros(self.count, bool), len(self.names)
+        which[: 2 * edges] = np.repeat(some[:edges], 2)
+        for c in range(len(self.circles)):
+            which[self.numbers(c)] = some[edges + c]
+        return which
+
     @property
     def normals(self) -> np.ndarray:
         """Unit normal (-t_y, t_x) of each line, shape (..., E, 2)."""
