@@ -1,1 +1,1 @@
-"""Several pictures of one part adjusted together (bundle adjustment): its features in space, and the sensors' places."""
+"""Several pictures of one part adjusted together (bundle adjustment): its features and the sensors in space."""

@@ -98,7 +98,7 @@ class Bundle:
         """Derivatives (q, n) of each picture's lines and circles by the unknowns."""
         return tuple(_design(self.unknowns, seen, k) for k, seen in enumerate(self.seen, 1))
 
-    def adjusted(self, errors: Sequence[np.ndarray], counts: Sequence[np.ndarray] | None = None) -> Adjustment:
+    def adjusted(self, errors: Sequence[np.ndarray], counts: Sequence[np.ndarray] | None = None) -> BundleAdjustment:
         """The adjustment of lines and circles whose noise has covariances (q, q), infinite on the diagonal of those
         that are not found; of those alone that count, bool (q,), where that is said."""
         whites, told = [], []
@@ -107,7 +107,7 @@ class Bundle:
             some = some if counts is None else some & counts[k]
             told.append(np.where(some[:, None] & some, covariance, 0.0))
             whites.append(whitening(told[-1]))
-        return Adjustment(self, tuple(whites), tuple(told))
+        return BundleAdjustment(self, tuple(whites), tuple(told))
 
     def expected(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
         """How far lines and circles (q,) of each picture are off by unknowns (n,) beside those of the pictures."""
@@ -128,7 +128,7 @@ class Bundle:
 
 
 @dataclass(frozen=True, eq=False)
-class Adjustment:
+class BundleAdjustment:
     """What pictures whose noise is known tell of the unknowns.
 
     Attributes

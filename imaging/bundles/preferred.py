@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.bundles.bundle import Adjustment, Bundle, lost
+from imaging.bundles.bundle import Bundle, BundleAdjustment, lost
 from imaging.bundles.left_open import left_open
 from scenes import status
 
@@ -19,14 +19,14 @@ class Preferred:
 
     Attributes
     ----------
-    good : Adjustment
+    good : BundleAdjustment
         Of lines and circles that are ``ok``.
-    every : Adjustment
+    every : BundleAdjustment
         Of all that have a place.
     """
 
-    good: Adjustment
-    every: Adjustment
+    good: BundleAdjustment
+    every: BundleAdjustment
 
     @classmethod
     def of(cls, bundle: Bundle, errors: Sequence[np.ndarray], states: Sequence[np.ndarray]) -> Preferred:

@@ -20,13 +20,14 @@ from imaging.features.seen import Seen
 from imaging.geometry.projection import camera_frame
 from imaging.pictures import Pictures
 from scenes import Circle, InvalidInput, Scene, Side
-from scenes.measurands.features import face_beside, plane_of
+from scenes.measurands.features import along_of, face_beside, plane_of
 from scenes.placement import prior
 
 Sensors = Literal["known", "uncertain", "unknown"]
 Shape = Literal["in_space", "in_plane"]
 Axes = Literal["known", "unknown"]
 _TURNS = slice(3, 6)
+_FLAT = 1e-6  # sine of an angle that is none
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,11 @@ class Unknowns:
         return np.concatenate(rows), [(name, part) for name, part in owners if part.stop > part.start]
 
     def _block(self, name: str) -> Block:
-        return self.blocks[list(self.slices).index(name)]
+        return self._by_name[name]
+
+    @cached_property
+    def _by_name(self) -> dict[str, Block]:
+        return {block.name: block for block in self.blocks}
 
 
 def _in_rad(sd: np.ndarray) -> np.ndarray:
@@ -202,11 +207,9 @@ def _of_features(scene: Scene, vertices: tuple[int, ...], seen: Seen, freedom: F
     """Of datums what their manufacture leaves open; of others nothing is known, or that they lie in their planes."""
     solid, placement = scene.solid, scene.placement
     told = placement.datum_sd if placement.datum_sd is not None else np.inf
-    exact = {end for name in placement.features if name in seen.names for end in solid.edge(name).ends}
     planes = _planes(scene, seen.names) if freedom.shape == "in_plane" else {}
     for vertex in vertices:
-        axes, out = _across(planes.get(vertex, []))
-        sd = np.where(out, 0.0, told if vertex in exact else np.inf)
+        axes, sd = _across(planes.get(vertex, []), _datums_at(scene, vertex, seen.names), told)
         yield Block.of(solid.vertex_names[vertex], axes, sd, slice(0))
     for name in seen.circles:
         axes, sd = np.eye(6), np.full(6, told if name in placement.features else np.inf)
@@ -233,14 +236,29 @@ def _planes(scene: Scene, edges: tuple[str, ...]) -> dict[int, list[np.ndarray]]
     return found
 
 
-def _across(normals: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Perpendicular axes (3, 3), in columns, and which of them leave planes of some normals, bool (3,)."""
-    if not normals:
-        return np.eye(3), np.zeros(3, bool)
-    _, sizes, axes = np.linalg.svd(np.array(normals))
-    out = np.zeros(3, bool)
-    out[: len(sizes)] = sizes > 1e-6
-    return axes.T, out
+def _datums_at(scene: Scene, vertex: int, edges: tuple[str, ...]) -> list[np.ndarray]:
+    """Unit vectors along the datums that end in a vertex."""
+    solid = scene.solid
+    datums = [solid.edge(name) for name in scene.placement.features if name in edges]
+    return [along_of(solid, Side(edge=each.name)) for each in datums if vertex in each.ends]
+
+
+def _across(normals: list[np.ndarray], datums: list[np.ndarray], sd: float) -> tuple[np.ndarray, np.ndarray]:
+    """Perpendicular axes (3, 3) of a vertex, in columns, and how well its place along each is known, (3,): exactly out
+    of planes of some normals, to ``sd`` across datums, not at all along the only one."""
+    plane, out, told = np.eye(3), 0, np.full(3, np.inf)
+    if normals:
+        _, sizes, axes = np.linalg.svd(np.array(normals))
+        plane, out = axes.T, int((sizes > _FLAT).sum())
+    if datums:
+        told[:], level = sd, plane[:, out:]
+        along = level @ (level.T @ datums[0])
+        if (np.linalg.svd(np.array(datums))[1][1:] < _FLAT).all() and np.linalg.norm(along) > _FLAT:
+            first = along / np.linalg.norm(along)
+            rest = np.linalg.svd(np.concatenate([plane[:, :out], first[:, None]], 1))[0][:, out + 1 :]
+            plane, told[out] = np.concatenate([plane[:, :out], first[:, None], rest], 1), np.inf
+    told[:out] = 0.0
+    return plane, told
 
 
 def rim_moves(circle: Circle) -> np.ndarray:

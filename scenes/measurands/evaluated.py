@@ -243,8 +243,8 @@ def _circle_condition(at: np.ndarray, circle: np.ndarray) -> tuple[np.ndarray, n
 def plane_through(points: list[Point]) -> tuple[Point, Point]:
     """The middle of at least three points and the unit normal, of either sign, of their least-squares plane.
 
-    The normal n is the eigenvector of the least eigenvalue of the points' scatter M; it moves by the others e_k, each by
-    (e_k . dM n) / (l_n - l_k).
+    The normal n is the eigenvector of the least eigenvalue of the points' scatter M; it moves by the others e_k, each
+    by (e_k . dM n) / (l_n - l_k).
     """
     centre = mean(points)
     away = np.stack([point.at for point in points], -2) - centre.at[..., None, :]
