@@ -6,6 +6,8 @@ import numpy as np
 
 from imaging.bundles.bundle import BundleAdjustment
 from imaging.bundles.told import Told
+from imaging.features.placing import steps
+from imaging.geometry.projection import sensor_position
 
 _MANY = 0.3  # of the block that is open most: others as open are named, too
 
@@ -15,7 +17,7 @@ def left_open(adjustment: BundleAdjustment, m: int) -> str:
     if adjustment.is_told[m]:
         return ""
     gradient, told = adjustment.bundle.nominal[1][m], adjustment.told
-    if Told(np.concatenate([told.rows, _size(adjustment)[None]]), told.units).is_told(gradient[None])[0]:
+    if Told(np.concatenate([told.rows, _apart(adjustment)[None]]), told.units).is_told(gradient[None])[0]:
         return "nothing tells the scale: where sensors stand must be known, or datums be named"
     left = told.left(gradient[None])[0]
     slices = adjustment.bundle.unknowns.slices
@@ -26,11 +28,12 @@ def left_open(adjustment: BundleAdjustment, m: int) -> str:
     return f"{pictures} open where {', '.join(names)} {'is' if len(names) == 1 else 'are'}"
 
 
-def _size(adjustment: BundleAdjustment) -> np.ndarray:
-    """Derivative (n,) of how far vertices and centres are from their middle, which no motion of the part changes."""
-    unknowns = adjustment.bundle.unknowns
-    places = adjustment.bundle.at(np.zeros(unknowns.count)).places()
-    names = [*map(unknowns.vertex, unknowns.vertices), *unknowns.circles]
-    away = places - places.mean(0)
-    pulls = [one @ unknowns.basis(name)[:3] for one, name in zip(away, names, strict=True)]
-    return np.sum(pulls, 0) / np.linalg.norm(away)
+def _apart(adjustment: BundleAdjustment) -> np.ndarray:
+    """Derivative (n,) of how far the first and the last sensor are apart, which no motion of all together changes."""
+    places, moves = [], []
+    for k in (1, len(adjustment.bundle.seen)):
+        seen = adjustment.bundle.seen[k - 1]
+        places.append(sensor_position(seen.camera, seen.sensors))
+        turned = steps(places[-1][None], np.array(seen.camera.look_at))[0]
+        moves.append(turned @ adjustment.bundle.unknowns.basis(f"sensor {k}"))
+    return (places[1] - places[0]) @ (moves[1] - moves[0])
