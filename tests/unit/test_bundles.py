@@ -17,16 +17,10 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from scenes import InvalidInput, Picture
 from tests import placements as parts
+from tests.bundles import SENSOR_SD, UNSURE, camera, exact_covariance, line_covariance, project, widths
 
 LIGHT = (22.0, 60.0)
 SENSORS = (28.0, 300.0), (30.0, 60.0), (25.0, 200.0)
-UNSURE = {
-    "part_shift": None,
-    "part_tilt_deg": None,
-    "sensor_deg": 0.02,
-    "sensor_distance": 0.1,
-    "sensor_roll_deg": 0.05,
-}
 KNOWN = {"from": "known", "datums": [], "datum_sd": None}
 
 
@@ -142,28 +136,6 @@ def test_depth_of_two_parallel_cameras_is_the_stereo_formula(folder):
     assert found == pytest.approx(away**2 * np.sqrt(2) * sigma / (focal * base), rel=1e-9)
 
 
-def _project(points, position, right, down, forward, focal):
-    """A pinhole written anew."""
-    away = points - position
-    return focal * np.stack([away @ right, away @ down], -1) / (away @ forward)[:, None]
-
-
-def _camera(scene, pose, numbers):
-    """Position and axes of a sensor whose distance, angles about right and down, and roll are off."""
-    polar, azimuth = np.radians(pose)
-    out = np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
-    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    down = np.cross(-out, right)
-    reach, *turn = numbers
-    vector = turn[0] * right + turn[1] * down - turn[2] * out
-    angle = np.linalg.norm(vector) + 1e-300
-    x, y, z = vector / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turned = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    place = np.array(scene.camera.look_at) + turned @ (scene.camera.distance * out) - reach * out
-    return place, turned @ right, turned @ down, turned @ -out, scene.camera.focal_px
-
-
 def test_the_adjustment_is_that_of_least_squares_over_everything(roof):
     """`scipy.optimize.least_squares`, numerical Jacobian, a projection of its own, three uncertain sensors.
 
@@ -174,15 +146,14 @@ def test_the_adjustment_is_that_of_least_squares_over_everything(roof):
     adjustment, unknowns = bundle.adjusted(noise), bundle.unknowns
     roots = [np.linalg.cholesky(np.where(np.isfinite(each), each, 0.0)) for each in noise]
     found = [root @ rng.standard_normal(len(root)) for root in roots]
-    sd = np.array([0.1, *np.radians([0.02, 0.02, 0.05])])
     names, start = bundle.seen[0].names, scene.solid.vertices[list(unknowns.vertices)]
     ends = [[unknowns.vertices.index(end) for end in scene.solid.edge(name).ends] for name in names]
 
     def rows(numbers):
         sensors, places = numbers[:12].reshape(3, 4), start + numbers[12:].reshape(-1, 3)
-        left = [(sensors / sd).ravel()]
+        left = [(sensors / SENSOR_SD).ravel()]
         for k, (pose, seen) in enumerate(zip(SENSORS, bundle.seen, strict=True)):
-            there = _project(places, *_camera(scene, pose, sensors[k]))
+            there = project(places, *camera(scene, pose, sensors[k]))
             off = []
             for e, (i, j) in enumerate(ends):
                 along = there[j] - there[i]
@@ -196,14 +167,9 @@ def test_the_adjustment_is_that_of_least_squares_over_everything(roof):
     solved = least_squares(rows, np.zeros(12 + start.size), "3-point", method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
 
     def values(numbers):
-        places = dict(zip(unknowns.vertices, start + numbers[12:].reshape(-1, 3), strict=True))
-        told = []
-        for quantity in scene.quantities:
-            (a, b), (c, d) = ([places[end] for end in scene.solid.edge(f.edge).ends] for f in quantity.features)
-            unit = (d - c) / np.linalg.norm(d - c)
-            away = (a + b) / 2 - c
-            told.append(np.linalg.norm(away - (away @ unit) * unit))
-        return np.array(told)
+        places = scene.solid.vertices.copy()
+        places[list(unknowns.vertices)] += numbers[12:].reshape(-1, 3)
+        return widths(scene.solid, scene.quantities, places)
 
     steps = 1e-5 * np.eye(solved.x.size)
     gradient = np.stack([(values(h) - values(-h)) / 2e-5 for h in steps], -1)
@@ -218,6 +184,31 @@ def test_the_adjustment_is_that_of_least_squares_over_everything(roof):
     assert (np.abs(off) < 0.05 * np.sqrt(np.diag(expected))).all(), off  # the same: 0.02 found
     whole = adjustment.covariance + sum(pull @ pull.T for pull in adjustment.by_priors.values())
     np.testing.assert_allclose(whole, expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("sensors", "sd"), [("uncertain", SENSOR_SD), ("known", None)])
+def test_the_adjustment_of_what_images_tell_is_their_fisher_matrix(folder, sensors, sd):
+    """Two pictures of a block pixel by pixel, all its vertices free in space, against lines adjusted; 1e-8 found.
+
+    Negative control: one edge less that ties both pictures.
+    """
+    pairs = [("e4", "e11"), ("e5", "e8"), ("e9", "e12"), ("e10", "e11"), ("e1", "e6"), ("e2", "e4"), ("e3", "e5")]
+    asked = [
+        {"name": f"{a} {b}", "kind": "width", "features": [{"edge": a}, {"edge": b}]} for a, b in (*pairs, ("e7", "e8"))
+    ]
+    scene = parts.scene(folder, "block", placement=KNOWN, uncertainty=UNSURE, measurands=asked)
+    pictures = tuple(Picture.of(scene, sensor, LIGHT) for sensor in SENSORS[:2])
+    exact = exact_covariance(pictures, sd)
+    bundle = Bundle.of(pictures, Freedom(sensors))
+    errors = [line_covariance(picture, seen) for picture, seen in zip(pictures, bundle.seen, strict=True)]
+    told = bundle.adjusted(errors)
+    assert told.is_told[:2].all()
+    whole = told.covariance + sum(pull @ pull.T for pull in told.by_priors.values())
+    both = np.ix_(told.is_told, told.is_told)
+    np.testing.assert_allclose(whole[both], exact[both], rtol=1e-4, atol=1e-6 * exact[both].max())
+    counts = [np.arange(seen.count) // 2 != seen.names.index("e8") for seen in bundle.seen]
+    less = bundle.adjusted(errors, counts)
+    assert less.covariance[1, 1] > 1.01 * told.covariance[1, 1]
 
 
 def test_drawn_sensors_and_noise_scatter_as_told(roof):
