@@ -41,6 +41,8 @@ class BundlePrediction(Shown):
     reason : tuple of str
         Why it is not told; empty where it is.
     pictures : tuple of Picture
+    preferred : Preferred
+        The adjustments, with the values' derivatives by lines and circles of each picture.
     """
 
     quantities: tuple[Quantity, ...]
@@ -51,6 +53,7 @@ class BundlePrediction(Shown):
     status: tuple[str, ...]
     reason: tuple[str, ...]
     pictures: tuple[Picture, ...]
+    preferred: Preferred
 
     @property
     def sigma(self) -> np.ndarray:
@@ -139,6 +142,7 @@ def predict_bundle(
         status=said if close else tuple(status.GLANCED if each == status.OK else each for each in said),
         reason=chosen.reasons,
         pictures=bundle.pictures,
+        preferred=chosen,
     )
 
 

@@ -66,9 +66,18 @@ class Preferred:
     @cached_property
     def covariance(self) -> np.ndarray:
         """Joint covariance (M, M) by noise; infinite on the diagonal of what is not told, NaN beside it."""
-        pulls = (self._rows(*both) for both in zip(self.good.by_features, self.every.by_features, strict=True))
-        whole = sum(pull @ error @ pull.T for pull, error in zip(pulls, self.every.errors, strict=True))
-        return lost(whole, self.is_told)
+        return self.spread(self.every.errors)
+
+    @cached_property
+    def by_features(self) -> tuple[np.ndarray, ...]:
+        """Derivatives (M, q) of the values by the lines and circles of each picture."""
+        both = zip(self.good.by_features, self.every.by_features, strict=True)
+        return tuple(np.where(self.good.is_told[:, None], good, every) for good, every in both)
+
+    def spread(self, errors: Sequence[np.ndarray]) -> np.ndarray:
+        """The same (M, M) by independent errors of lines and circles of each picture of covariances (q, q)."""
+        told = zip(self.by_features, errors, strict=True)
+        return lost(sum(pull @ error @ pull.T for pull, error in told), self.is_told)
 
     @cached_property
     def known_before(self) -> dict[str, np.ndarray]:
@@ -81,9 +90,6 @@ class Preferred:
         """Of all these together, (M,); infinite of what is not told."""
         parts = self.known_before.values()
         return np.sqrt(sum((part**2 for part in parts), np.where(self.is_told, 0.0, np.inf)))
-
-    def _rows(self, good: np.ndarray, every: np.ndarray) -> np.ndarray:
-        return np.where(self.good.is_told[:, None], good, every)
 
 
 def _mildest(states: tuple[str, ...]) -> str:
