@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 
 from imaging.bundles.bundle import Bundle
 from imaging.bundles.preferred import Preferred
-from imaging.bundles.unknowns import Axes, Freedom, Sensors, Shape
+from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
 from measure.best import best_estimator
 from measure.goodness import WORST
 from measure.measurement import checked_image
@@ -116,6 +116,7 @@ def bundle(
     *,
     shape: Shape = "in_space",
     axes: Axes = "known",
+    cameras: Cameras = "one",
     estimator: str | None = None,
 ) -> Bundled:
     """Measure several pictures of one part together (bundle adjustment), its own features the ties.
@@ -125,7 +126,7 @@ def bundle(
     shots : sequence of (ndarray, Picture)
         Images, shape (..., height, width), and what each shows: sensor, light, and the part about where it lies, within
         the capture of the locator.
-    sensors, shape, axes
+    sensors, shape, axes, cameras
         What is not known before (`imaging.bundles.unknowns.Freedom`).
     estimator : str, optional
         As for `measure.measure`.
@@ -150,7 +151,7 @@ def bundle(
     >>> bundle([(black, picture) for picture in two], "known", estimator="gradient").status.tolist()
     ['low_contrast']
     """
-    freedom = Freedom(sensors, shape, axes)
+    freedom = Freedom(sensors, shape, axes, cameras)
     stacks, pictures, lead = _checked(shots)
     expected = Bundle.of(pictures, freedom)
     names = [estimator or best_estimator(picture) for picture in pictures]

@@ -10,7 +10,7 @@ import numpy as np
 
 from imaging.bundles.bundle import Bundle
 from imaging.bundles.preferred import Preferred
-from imaging.bundles.unknowns import Axes, Freedom, Sensors, Shape
+from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
 from imaging.features.circles import LEAST_SEEN
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
 from imaging.models.bias import cluttered
@@ -96,6 +96,7 @@ def predict_bundle(
     *,
     shape: Shape = "in_space",
     axes: Axes = "known",
+    cameras: Cameras = "one",
     model: ModelName = DEFAULT_MODEL,
     close: bool = True,
 ) -> BundlePrediction:
@@ -104,7 +105,7 @@ def predict_bundle(
     Parameters
     ----------
     pictures : sequence of Picture
-    sensors, shape, axes
+    sensors, shape, axes, cameras
         What is not known before (`imaging.bundles.unknowns.Freedom`).
     model : {"calibrated", "paper"}
         Of the lines' and circles' variances.
@@ -127,7 +128,7 @@ def predict_bundle(
     """
     if model not in ("calibrated", "paper"):
         raise InvalidInput(f"model must be one of calibrated, paper for several pictures, got {model!r}")
-    bundle = Bundle.of(pictures, Freedom(sensors, shape, axes))
+    bundle = Bundle.of(pictures, Freedom(sensors, shape, axes, cameras))
     each = [variance_model(model)(Pictures.of(picture)) for picture in bundle.pictures]
     states = [_states(errors, picture, close=close) for errors, picture in zip(each, bundle.pictures, strict=True)]
     chosen = Preferred.of(bundle, [errors.of_features for errors in each], states)

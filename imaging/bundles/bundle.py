@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from imaging.bundles.cameras import by_camera
 from imaging.bundles.in_space import InSpace
 from imaging.bundles.told import Told
 from imaging.bundles.unknowns import Freedom, Unknowns, rim, rim_moves
@@ -231,6 +232,7 @@ def _design(unknowns: Unknowns, seen: Seen, number: int) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         whole = by_place(seen, np.array(unknowns.scene.camera.look_at)) @ unknowns.basis("part")
         whole = whole - by_place(seen) @ unknowns.basis(f"sensor {number}")
+        whole = whole + by_camera(seen) @ unknowns.basis(unknowns.camera(number))
         for e, name in enumerate(seen.names):
             ends = list(solid.edge(name).ends)
             slopes = np.einsum("i,nij->nj", seen.normals[e], seen.slopes(solid.vertices[ends]))
@@ -257,7 +259,7 @@ def _off(unknowns: Unknowns, seen: Seen, number: int, numbers: np.ndarray) -> np
         here = from_axis(circle.at(around(circle)), seen.sensors, seen.camera)
         normal = rim_normals(seen, circle)
         off[seen.numbers(c)] = rim_fit(seen, circle)[1] @ np.einsum("ni,ni->n", normal, there - here)
-    return off
+    return off + by_camera(seen) @ unknowns.full(unknowns.camera(number), numbers)
 
 
 def _ends(unknowns: Unknowns, name: str, numbers: np.ndarray) -> np.ndarray:

@@ -2,8 +2,9 @@
 
 Blocks, each of some full numbers of which directions are free: ``part`` a shift and a rotation vector (rad) about the
 point that the camera looks at; ``sensor 1``, ... the same of each sensor; a vertex its three coordinates, a circle
-those of its centre, two tilts of its axis about its plane's axes (rad) and its radius. All are errors beside what the
-scene says, features' along the axes of the part.
+those of its centre, two tilts of its axis about its plane's axes (rad) and its radius; ``camera`` the parameters of
+its calibration (`imaging.bundles.cameras`). All are errors beside what the scene says, features' along the axes of the
+part.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from imaging.bundles.cameras import root
 from imaging.features.placing import around
 from imaging.features.seen import Seen
 from imaging.geometry.projection import camera_frame
@@ -26,6 +28,7 @@ from scenes.placement import prior
 Sensors = Literal["known", "uncertain", "unknown"]
 Shape = Literal["in_space", "in_plane"]
 Axes = Literal["known", "unknown"]
+Cameras = Literal["one", "each"]
 _TURNS = slice(3, 6)
 _FLAT = 1e-6  # sine of an angle that is none
 
@@ -43,6 +46,9 @@ class Freedom:
         Whether features may lie anywhere beside where the model has them, or each in its plane there.
     axes : {"known", "unknown"}
         Whether circles' axes point on the part as the model says.
+    cameras : {"one", "each"}
+        Whether all pictures are of one camera, or each of its own, as to what ``uncertainty.covariance`` and
+        ``principal_point_px`` leave open of it.
 
     Raises
     ------
@@ -53,6 +59,7 @@ class Freedom:
     sensors: Sensors | tuple[Sensors, ...] = "uncertain"
     shape: Shape = "in_space"
     axes: Axes = "known"
+    cameras: Cameras = "one"
 
     def __post_init__(self) -> None:
         each = self.sensors if isinstance(self.sensors, tuple) else (self.sensors,)
@@ -60,6 +67,7 @@ class Freedom:
             *(("sensors", one, ("known", "uncertain", "unknown")) for one in each),
             ("shape", self.shape, ("in_space", "in_plane")),
             ("axes", self.axes, ("known", "unknown")),
+            ("cameras", self.cameras, ("one", "each")),
         ):
             if told not in choices:
                 raise InvalidInput(f"{name} must be one of {', '.join(choices)}, got {told!r}")
@@ -114,7 +122,7 @@ class Unknowns:
         Of the part, at the ends of the edges that are used.
     circles : tuple of str
     blocks : tuple of Block
-        The part, the V sensors, the vertices, the circles.
+        The part, the V sensors, the cameras, the vertices, the circles.
     """
 
     scene: Scene
@@ -130,6 +138,7 @@ class Unknowns:
         sensors = freedom.of_sensors(len(pictures))
         blocks = [Block.of("part", np.eye(6), _in_rad(prior(scene.uncertainty)), _TURNS)]
         blocks += [_sensor(k, told, each) for k, (told, each) in enumerate(zip(sensors, pictures, strict=True), 1)]
+        blocks += _cameras(pictures, freedom)
         blocks += _of_features(scene, vertices, seen, freedom)
         return cls(scene, vertices, seen.circles, tuple(blocks))
 
@@ -158,6 +167,10 @@ class Unknowns:
     def units(self) -> np.ndarray:
         """Changes (n,) that move a part of its size about alike: a length, and turns by it over the size."""
         return np.concatenate([np.where(each.turns, 1 / self.scene.solid.extent, 1.0) for each in self.blocks])
+
+    def camera(self, number: int) -> str:
+        """Name of the block of the camera of the picture of a number."""
+        return "camera" if "camera" in self.slices else f"camera {number}"
 
     def vertex(self, index: int) -> str:
         """Name of a vertex' block."""
@@ -201,6 +214,16 @@ def _sensor(number: int, told: Sensors, pictures: Pictures) -> Block:
     turns = [aside, aside, 0.0 if said.sensor_roll_deg is None else said.sensor_roll_deg.u]
     reach = 0.0 if said.sensor_distance is None else said.sensor_distance.u
     return Block.of(f"sensor {number}", directions, _in_rad(np.array([0.0, 0.0, reach, *turns])), _TURNS)
+
+
+def _cameras(pictures: tuple[Pictures, ...], freedom: Freedom) -> Iterator[Block]:
+    """Of all pictures' camera, or of each its own."""
+    for k, each in enumerate(pictures, 1):
+        half = root(each.scene)
+        name = "camera" if freedom.cameras == "one" else f"camera {k}"
+        yield Block(name, half, np.ones(half.shape[1]), np.zeros(half.shape[1], bool))
+        if freedom.cameras == "one":
+            return
 
 
 def _of_features(scene: Scene, vertices: tuple[int, ...], seen: Seen, freedom: Freedom) -> Iterator[Block]:

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from imaging.bundles.unknowns import Axes, Freedom, Sensors, Shape
+from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
 from imaging.features.measurand import measurands
 from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.bias import MOST
 from imaging.pictures import Pictures
-from planner.budgeting.budgets import shared_inputs
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import STEP, pulled
 from planner.budgeting.sources import Source, sources
@@ -21,8 +20,9 @@ from planner.bundles import BundlePrediction, predict_bundle
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
 from scenes import InvalidInput, Picture, Uncertain
+from scenes.cameras.covariance import ORDER
 
-_ADJUSTED = ("part_shift", "part_tilt_deg")
+_ADJUSTED = ("part_shift", "part_tilt_deg", "principal_point_px")
 _OF_SENSORS = ("sensor_deg", "sensor_roll_deg", "sensor_distance")
 
 
@@ -32,16 +32,17 @@ def bundle_budget(
     *,
     shape: Shape = "in_space",
     axes: Axes = "known",
+    cameras: Cameras = "one",
     p: float = 0.95,
 ) -> tuple[Budget, ...]:
-    """The uncertainty of every measurand of pictures by one camera, adjusted together; one budget a measurand.
+    """The uncertainty of every measurand of pictures adjusted together; one budget a measurand.
 
-    Rows of what the adjustment knows before are ``part``, ``sensor 1``, ... and ``datums``; a sensor that counts as known
-    has those of its pose, with its number. What is not known of the camera is the same in all pictures.
+    Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``camera`` and ``datums``; a sensor that
+    counts as known has those of its pose, with its number.
 
     Parameters
     ----------
-    pictures, sensors, shape, axes
+    pictures, sensors, shape, axes, cameras
         As of `planner.predict_bundle`.
     p : float
         Coverage probability of the expanded uncertainties.
@@ -51,13 +52,12 @@ def bundle_budget(
     InvalidInput
         If the pictures do not tell a measurand.
     """
-    told = predict_bundle(pictures, sensors, shape=shape, axes=axes)
+    told = predict_bundle(pictures, sensors, shape=shape, axes=axes, cameras=cameras)
     for quantity, state, why in zip(told.quantities, told.status, told.reason, strict=True):
         if why or not np.isfinite(told.covariance[told.quantities.index(quantity)][told.quantities.index(quantity)]):
             raise InvalidInput(f"{quantity.name} must be measurable for a budget, got {state}: {why}")
-    scene = told.pictures[0].scene
     given, slopes = _sources(told, Freedom(sensors).of_sensors(len(told.pictures)))
-    inputs, budgets = shared_inputs(scene, given), []
+    inputs, budgets = tuple(source.as_input for source in given), []
     for m, (quantity, slope, rows) in enumerate(zip(told.quantities, slopes, _terms(told), strict=True)):
         by_name = {source.name: float(c) for source, c in zip(given, slope, strict=True)}
         by_name |= {row.name: row.sensitivity for row in rows}
@@ -74,7 +74,8 @@ def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[So
         here = Station.nominal(features.pictures)
         for each in sources(picture.scene):
             of_sensor = each.name.startswith(_OF_SENSORS)
-            if each.kind != "geometry" or each.name.startswith(_ADJUSTED) or (of_sensor and sensors[k] != "known"):
+            adjusted = each.name.startswith(_ADJUSTED) or each.name in ORDER or (of_sensor and sensors[k] != "known")
+            if each.kind != "geometry" or adjusted:
                 continue
             step = STEP * each.scale
             ahead, behind = features.errors([each.moved(here, step), each.moved(here, -step)])
@@ -91,7 +92,7 @@ def _renamed(source: Source, name: str) -> Source:
 
 
 def _terms(told: BundlePrediction) -> list[list[Term]]:
-    """Of each quantity noise, what is known before of the adjusted, model error, fixed pattern, rounding, temperature."""
+    """Of each quantity noise, model error, what is known before, fixed pattern, rounding, temperature."""
     scene, pattern = told.pictures[0].scene, np.zeros(len(told.quantities))
     if scene.uncertainty.fixed_pattern and (scene.noise.prnu or scene.noise.dsnu):
         each = [Pictures.of(picture) for picture in told.pictures]
@@ -111,5 +112,5 @@ def _terms(told: BundlePrediction) -> list[list[Term]]:
 
 
 def _is_place(name: str) -> bool:
-    """Whether a block is the part's place or a sensor's, not a datum."""
-    return name == "part" or name.startswith("sensor ")
+    """Whether a block is the part's place, a sensor's or a camera's numbers, not a datum."""
+    return name == "part" or name.startswith(("sensor ", "camera"))

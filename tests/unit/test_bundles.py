@@ -11,11 +11,17 @@ import render
 import scenes
 from imaging.blurred.whole import image
 from imaging.bundles.bundle import Bundle
+from imaging.bundles.cameras import by_camera, root
 from imaging.bundles.told import Told
 from imaging.bundles.unknowns import Freedom
 from imaging.models import variance_model
 from imaging.pictures import Pictures
+from planner.budgeting.bundles import bundle_budget
+from planner.budgeting.features import Features
+from planner.budgeting.sources import sources
+from planner.budgeting.station import Station
 from scenes import InvalidInput, Picture
+from scenes.cameras.covariance import ORDER
 from tests import placements as parts
 from tests.bundles import SENSOR_SD, UNSURE, camera, exact_covariance, line_covariance, project, widths
 
@@ -255,6 +261,61 @@ def test_what_pictures_leave_open_is_told_and_has_no_value():
     datums = planner.predict_bundle([each.with_scene(made) for each in tri], "unknown", close=False)
     assert datums.status == ("glanced", "glanced")
     assert datums.u_placed[0] > 0.001  # what its datums are not sure of
+
+
+CALIBRATED = {
+    "names": ["fx", "cx", "cy", "k1"],
+    "matrix": [[0.36, 0, 0, 1e-4], [0, 0.16, 0, 0], [0, 0, 0.16, 0], [1e-4, 0, 0, 1e-6]],
+}
+
+
+def test_what_a_camera_s_errors_move_is_what_a_budget_has(folder):
+    """Derivatives of lines and a circle against those of recorded points (`planner.budgeting`), which weigh the part of
+    an edge that is used, and places around a rim by contrast: where distortion bends a line that is a few percent."""
+    plate = scenes.load("plate").with_(
+        measurands=[LENGTH, SQUARE, {"name": "bore", "kind": "diameter", "features": [{"circle": "c2"}]}],
+        uncertainty={"covariance": CALIBRATED},
+    )
+    pictures = Pictures.of(Picture.of(plate, (35, 70), (20, 225)))
+    features = Features(pictures)
+    ours, here = by_camera(features.known.seen), Station.nominal(pictures)
+    assert root(plate) @ root(plate).T == pytest.approx(np.array(_grown(CALIBRATED)), abs=1e-12)
+    for each in sources(plate):
+        step = 1e-5 * each.scale
+        ahead, behind = features.errors([each.moved(here, step), each.moved(here, -step)])
+        ours_now = ours[:, ORDER.index(each.name)] + (ours[:, ORDER.index("fy")] if each.name == "fx" else 0.0)
+        expected, bent = (ahead - behind) / (2 * step), each.name == "k1"
+        off = np.abs(ours_now - expected) / np.abs(expected).max()
+        assert off.max() < (0.1 if bent else 0.02), (each.name, off)
+
+
+def _grown(told):
+    """A covariance of fx, cx, cy, k1 as one of all nine parameters, fy as fx."""
+    whole = np.zeros((9, 9))
+    which = [ORDER.index(name) for name in told["names"]]
+    whole[np.ix_(which, which)] = told["matrix"]
+    whole[1] = whole[0]
+    whole[:, 1] = whole[:, 0]
+    return whole
+
+
+def test_a_budget_of_several_pictures_has_what_is_adjusted_and_what_is_not(roof):
+    """Rows by name; their squares add up to noise and `u_placed`; one camera for all is another thing than three."""
+    scene = roof[0].scene.with_(uncertainty={"covariance": CALIBRATED, "rounding": 0.001})
+    pictures = [each.with_scene(scene) for each in roof]
+    told = planner.predict_bundle(pictures)
+    budgets = bundle_budget(pictures)
+    for m, each in enumerate(budgets):
+        rows = {row.source: row.contribution for row in each.contributions}
+        assert {"pixel noise", "sensor 1", "sensor 2", "sensor 3", "camera", "rounding"} <= set(rows)
+        adjusted = sum(rows[name] ** 2 for name in ("pixel noise", "sensor 1", "sensor 2", "sensor 3", "camera"))
+        assert adjusted == pytest.approx(told.u[m] ** 2, rel=1e-6)
+        assert each.value == pytest.approx(told.value[m])
+    known = {row.source: row.contribution for row in bundle_budget(pictures, "known")[0].contributions}
+    assert {"sensor_distance 1", "sensor_deg.azimuth 2", "camera"} <= set(known)
+    assert planner.predict_bundle(pictures, cameras="each").u[0] != pytest.approx(told.u[0], rel=1e-3)
+    with pytest.raises(InvalidInput, match="length must be measurable for a budget, got unplaced: "):
+        bundle_budget(pictures[:1])
 
 
 @pytest.mark.parametrize(
