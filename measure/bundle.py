@@ -181,11 +181,11 @@ class _One:
         errors, off = [each.of_datums[i] for each in found], [each.offsets[i] for each in found]
         chosen = Preferred.of(expected, errors, states)
         numbers, squares = chosen.good.solved(off)
-        if chosen.good.is_told.all():
+        if chosen.by_good.all():
             value, freedom = expected.values(numbers), chosen.good.told.freedom
         else:
             everything, squares = chosen.every.solved(off)
-            value = np.where(chosen.good.is_told, expected.values(numbers), expected.values(everything))
+            value = np.where(chosen.by_good, expected.values(numbers), expected.values(everything))
             numbers, freedom = everything, chosen.every.told.freedom
         p_value = float(chdtrc(freedom, squares)) if freedom > 0 else 1.0
         fits = status.OK if p_value >= WORST else status.MISFIT

@@ -31,10 +31,11 @@ from planner.views import plan_views
 
 if TYPE_CHECKING:
     from planner.budgeting.budgets import SceneBudget, budget
+    from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
 
 _LATER = {
-    "SceneBudget": "budgets", "budget": "budgets", "CapabilityPlan": "plans", "plan_capability": "plans",
+    "BundleBudget": "bundles", "SceneBudget": "budgets", "bundle_budget": "bundles", "budget": "budgets", "CapabilityPlan": "plans", "plan_capability": "plans",
 }  # fmt: skip
 
 
@@ -51,6 +52,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "Aim",
+    "BundleBudget",
     "BundlePrediction",
     "Candidate",
     "CapabilityPlan",
@@ -75,6 +77,7 @@ __all__ = [
     "ViewingSpace",
     "Views",
     "budget",
+    "bundle_budget",
     "combine",
     "coverage",
     "exhaustive",

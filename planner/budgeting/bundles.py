@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +27,32 @@ _ADJUSTED = ("part_shift", "part_tilt_deg", "principal_point_px")
 _OF_SENSORS = ("sensor_deg", "sensor_roll_deg", "sensor_distance")
 
 
+@dataclass(frozen=True, eq=False)
+class BundleBudget:
+    """Budgets of all measurands, and what they are made of.
+
+    Attributes
+    ----------
+    prediction : BundlePrediction
+    measurands : tuple of Budget
+        In the scene's unit, or degrees.
+    """
+
+    prediction: BundlePrediction
+    measurands: tuple[Budget, ...]
+
+    @property
+    def statuses(self) -> tuple[str, ...]:
+        """Of the values: only what `scenes.status.is_trusted` has a U that may be signed."""
+        return self.prediction.status
+
+    def __iter__(self) -> Iterator[Budget]:
+        return iter(self.measurands)
+
+    def __getitem__(self, name: str) -> Budget:
+        return next(each for each in self.measurands if each.name == name)
+
+
 def bundle_budget(
     pictures: Sequence[Picture],
     sensors: Sensors | tuple[Sensors, ...] = "uncertain",
@@ -34,7 +61,7 @@ def bundle_budget(
     axes: Axes = "known",
     cameras: Cameras = "one",
     p: float = 0.95,
-) -> tuple[Budget, ...]:
+) -> BundleBudget:
     """The uncertainty of every measurand of pictures adjusted together; one budget a measurand.
 
     Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``camera`` and ``datums``; a sensor that
@@ -53,8 +80,8 @@ def bundle_budget(
         If the pictures do not tell a measurand.
     """
     told = predict_bundle(pictures, sensors, shape=shape, axes=axes, cameras=cameras)
-    for quantity, state, why in zip(told.quantities, told.status, told.reason, strict=True):
-        if why or not np.isfinite(told.covariance[told.quantities.index(quantity)][told.quantities.index(quantity)]):
+    for quantity, sigma, state, why in zip(told.quantities, told.sigma, told.status, told.reason, strict=True):
+        if not np.isfinite(sigma):
             raise InvalidInput(f"{quantity.name} must be measurable for a budget, got {state}: {why}")
     given, slopes = _sources(told, Freedom(sensors).of_sensors(len(told.pictures)))
     inputs, budgets = tuple(source.as_input for source in given), []
@@ -63,7 +90,7 @@ def bundle_budget(
         by_name |= {row.name: row.sensitivity for row in rows}
         whole = (*inputs, *(row.as_input for row in rows))
         budgets.append(combined(quantity.name, told.units[m], float(told.value[m]), whole, by_name, p))
-    return tuple(budgets)
+    return BundleBudget(told, tuple(budgets))
 
 
 def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[Source, ...], np.ndarray]:

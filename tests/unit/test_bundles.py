@@ -12,6 +12,7 @@ import scenes
 from imaging.blurred.whole import image
 from imaging.bundles.bundle import Bundle
 from imaging.bundles.cameras import by_camera, root
+from imaging.bundles.preferred import Preferred
 from imaging.bundles.told import Told
 from imaging.bundles.unknowns import Freedom
 from imaging.models import variance_model
@@ -305,17 +306,37 @@ def test_a_budget_of_several_pictures_has_what_is_adjusted_and_what_is_not(roof)
     pictures = [each.with_scene(scene) for each in roof]
     told = planner.predict_bundle(pictures)
     budgets = bundle_budget(pictures)
+    assert budgets.statuses == told.status
     for m, each in enumerate(budgets):
         rows = {row.source: row.contribution for row in each.contributions}
         assert {"pixel noise", "sensor 1", "sensor 2", "sensor 3", "camera", "rounding"} <= set(rows)
         adjusted = sum(rows[name] ** 2 for name in ("pixel noise", "sensor 1", "sensor 2", "sensor 3", "camera"))
         assert adjusted == pytest.approx(told.u[m] ** 2, rel=1e-6)
         assert each.value == pytest.approx(told.value[m])
-    known = {row.source: row.contribution for row in bundle_budget(pictures, "known")[0].contributions}
+    known = {row.source: row.contribution for row in bundle_budget(pictures, "known")["length"].contributions}
     assert {"sensor_distance 1", "sensor_deg.azimuth 2", "camera"} <= set(known)
     assert planner.predict_bundle(pictures, cameras="each").u[0] != pytest.approx(told.u[0], rel=1e-3)
     with pytest.raises(InvalidInput, match="length must be measurable for a budget, got unplaced: "):
         bundle_budget(pictures[:1])
+
+
+def test_a_datum_that_no_picture_shows_well_is_not_measured_by_the_drawing():
+    """Two datums, one of them clutter in both pictures: the angle between them leans on it and is clutter, not ok; where
+    it is not seen at all there is none, though the drawing tells one."""
+    pair = {"from": "datums", "datums": ["e4", "e8"], "datum_sd": 0.001}
+    scene = scenes.load("plate").with_(
+        measurands=[SQUARE], placement=pair, uncertainty={"part_shift": 1.0, "part_tilt_deg": 1.0}
+    )
+    pictures = [Picture.of(scene, sensor, (20, 225)) for sensor in ((35, 70), (30, 200))]
+    bundle, noise = Bundle.of(pictures, Freedom("known")), noise_of(pictures)
+    for second, says in (("ok", "ok"), ("clutter", "clutter"), ("short", "short")):
+        states = [np.array(["ok", second])] * 2
+        assert bundle.seen[0].names == ("e4", "e8")
+        told = Preferred.of(bundle, noise, states)
+        assert told.statuses(states) == (says,)
+        assert np.isfinite(told.u_placed[0]) == (second != "short")
+    assert told.good.is_told.all()
+    assert told.reasons == ("no picture shows a datum that it needs, which is known by the drawing alone",)
 
 
 @pytest.mark.parametrize(
