@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from planner.budgeting.plans import CapabilityPlan, plan_capability
 
 _LATER = {
-    "BundleBudget": "bundles", "SceneBudget": "budgets", "bundle_budget": "bundles", "budget": "budgets", "CapabilityPlan": "plans", "plan_capability": "plans",
+    "BundleBudget": "bundles", "SceneBudget": "budgets", "budget": "budgets", "bundle_budget": "bundles",
+    "CapabilityPlan": "plans", "plan_capability": "plans",
 }  # fmt: skip
 
 

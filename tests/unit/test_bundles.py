@@ -321,8 +321,8 @@ def test_a_budget_of_several_pictures_has_what_is_adjusted_and_what_is_not(roof)
 
 
 def test_a_datum_that_no_picture_shows_well_is_not_measured_by_the_drawing():
-    """Two datums, one of them clutter in both pictures: the angle between them leans on it and is clutter, not ok; where
-    it is not seen at all there is none, though the drawing tells one."""
+    """Two datums, one of them clutter in both pictures: the angle between them leans on it and is clutter, not ok;
+    where it is not seen at all there is none, though the drawing tells one."""
     pair = {"from": "datums", "datums": ["e4", "e8"], "datum_sd": 0.001}
     scene = scenes.load("plate").with_(
         measurands=[SQUARE], placement=pair, uncertainty={"part_shift": 1.0, "part_tilt_deg": 1.0}
