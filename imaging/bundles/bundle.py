@@ -26,7 +26,9 @@ from imaging.features.seen import Seen
 from imaging.geometry.projection import from_axis
 from imaging.pictures import Pictures
 from imaging.placed import difference, placed, turn
-from scenes import InvalidInput, Picture, Quantity
+from scenes import InvalidInput, Picture, Quantity, Wall
+from scenes.measurands.form import forms_of
+from scenes.measurands.kinds import MEASURANDS
 
 _STEPS = 20
 _SETTLED = 1e-9  # of a standard deviation of the noise, in any row
@@ -284,5 +286,11 @@ def _check(pictures: tuple[Picture, ...]) -> None:
     for each in pictures[1:]:
         if each.scene.quantities != first.quantities or each.scene.object != first.object:
             raise InvalidInput("pictures must be of one part with the same measurands, got others")
+    for each in first.quantities:
+        curved = any(isinstance(feature, Wall) for feature in each.basic)
+        if curved or MEASURANDS[each.kind].extreme or forms_of((each,)):
+            raise InvalidInput(
+                f"measurands must be of straight edges and circles for several pictures, got {each.name}"
+            )
     if first.placement.board is not None:
         raise InvalidInput("placement.from must be known, uncertain or datums for several pictures, got 'board'")

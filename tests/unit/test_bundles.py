@@ -24,6 +24,7 @@ from planner.budgeting.station import Station
 from scenes import InvalidInput, Picture
 from scenes.cameras.covariance import ORDER
 from tests import placements as parts
+from tests import toleranced
 from tests.bundles import SENSOR_SD, UNSURE, camera, exact_covariance, line_covariance, project, widths
 
 LIGHT = (22.0, 60.0)
@@ -101,6 +102,18 @@ def test_circles_in_their_planes_are_today_s_too():
     told = Bundle.of([picture], Freedom("known", "in_plane")).adjusted([errors.of_features])
     np.testing.assert_allclose(np.diag(told.covariance), errors.variances_object, rtol=1e-6)
     np.testing.assert_allclose(told.known_before["part"] ** 2, errors.placed, rtol=1e-6)
+
+
+def test_kinds_of_measurands_in_space_are_those_of_one_picture_s_planes(folder):
+    """All kinds of edges and circles, and what lies between some: values of the part, variances of one picture."""
+    scene = toleranced.scene(folder, facets=48)
+    picture = Picture.of(scene, (25, 290), (20, 200))
+    errors = variance_model("calibrated")(Pictures.of(picture))
+    bundle = Bundle.of([picture], Freedom("known", "in_plane"))
+    np.testing.assert_allclose(bundle.nominal[0], errors.measurands.value_object, rtol=1e-6, atol=1e-6)
+    told = bundle.adjusted([errors.of_features])
+    assert told.is_told.all()
+    np.testing.assert_allclose(np.diag(told.covariance), errors.variances_object, rtol=1e-5)
 
 
 def test_derivatives_of_a_picture_are_those_of_exact_projection(folder):
@@ -349,6 +362,10 @@ def test_a_datum_that_no_picture_shows_well_is_not_measured_by_the_drawing():
         (
             lambda two: Bundle.of([two[0], two[1].with_scene(scenes.load("plate"))], Freedom()),
             "pictures must be of one",
+        ),
+        (
+            lambda two: Bundle.of([Picture.of(scenes.load("shaft"), (20, 0))], Freedom()),
+            "straight edges and circ",
         ),
         (lambda two: measure.bundle([]), "shots must be at least one image with its picture, got none"),
         (lambda two: planner.predict_bundle(two, model="bound"), "model must be one of calibrated, paper"),

@@ -83,6 +83,12 @@ def test_two_pictures_do(wedge):
     assert (np.abs(found.value.mean(0) - found.nominal) < 5 * found.sigma.mean(0) / np.sqrt(count)).all()
 
 
+def test_no_chain_is_made_of_them(wedge):
+    asked = wedge.model_dump(by_alias=True, mode="json", include={"measurands"})["measurands"]
+    with pytest.raises(InvalidInput, match="of must be numbers that one picture tells, got drop, slope"):
+        wedge.with_(measurands=[*asked, {"name": "all", "kind": "mean", "of": ["drop", "slope"]}])
+
+
 @pytest.mark.parametrize(
     ("kind", "features", "says"),
     [
