@@ -45,7 +45,8 @@ class Bundled(Shown):
         The same of each alone, (..., M), by its name: ``part``, ``sensor 1``, ..., a datum's vertices and circles.
     status : ndarray of str, shape (..., M)
         ``ok``; ``clutter`` where it needs lines or circles that are biased; ``misfit`` where the pictures do not fit
-        each other (chi-square, p < 1e-4); ``unplaced`` where they leave it open; else what its features lack.
+        each other (chi-square of what is ``ok``, p < 1e-4); ``unplaced`` where they leave it open; else what its
+        features lack.
     p_value : ndarray, shape (...)
         Of the chi-square; 1 where nothing is seen twice.
     reason : tuple of str
@@ -181,12 +182,12 @@ class _One:
         errors, off = [each.of_datums[i] for each in found], [each.offsets[i] for each in found]
         chosen = Preferred.of(expected, errors, states)
         numbers, squares = chosen.good.solved(off)
-        if chosen.by_good.all():
-            value, freedom = expected.values(numbers), chosen.good.told.freedom
-        else:
-            everything, squares = chosen.every.solved(off)
-            value = np.where(chosen.by_good, expected.values(numbers), expected.values(everything))
-            numbers, freedom = everything, chosen.every.told.freedom
+        value, freedom = expected.values(numbers), chosen.good.told.freedom
+        if not chosen.by_good.all():
+            everything, more = chosen.every.solved(off)
+            value = np.where(chosen.by_good, value, expected.values(everything))
+            if not chosen.by_good.any():
+                numbers, squares, freedom = everything, more, chosen.every.told.freedom
         p_value = float(chdtrc(freedom, squares)) if freedom > 0 else 1.0
         fits = status.OK if p_value >= WORST else status.MISFIT
         told = tuple(status.worst(each, fits) for each in chosen.statuses(states))

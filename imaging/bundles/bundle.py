@@ -261,7 +261,8 @@ def _off(unknowns: Unknowns, seen: Seen, number: int, numbers: np.ndarray) -> np
         here = from_axis(circle.at(around(circle)), seen.sensors, seen.camera)
         normal = rim_normals(seen, circle)
         off[seen.numbers(c)] = rim_fit(seen, circle)[1] @ np.einsum("ni,ni->n", normal, there - here)
-    return off + by_camera(seen) @ unknowns.full(unknowns.camera(number), numbers)
+    camera = unknowns.full(unknowns.camera(number), numbers)
+    return off + by_camera(seen) @ camera if camera.any() else off
 
 
 def _ends(unknowns: Unknowns, name: str, numbers: np.ndarray) -> np.ndarray:
