@@ -173,7 +173,9 @@ def station() -> Scene:
 
 
 def report(rows: list[Row]) -> bool:
-    """Printed, and whether all is as told and the controls are not."""
+    """Printed, and whether there is something and all is as told."""
+    if not rows:
+        return False
     for row, held, mid in zip(rows, inside(rows), centred(rows), strict=True):
         told = f"measured / told {row.ratio:.3f}, mean {row.pulls.mean():+.3f} sigma, {len(row.pulls)} sets"
         print(f"{row.label:40} {told}{'' if held else '  OUTSIDE CHANCE'}{'' if mid else '  OFF'}")
