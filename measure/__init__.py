@@ -11,6 +11,7 @@ from measure.boards.chessboard import Board, chessboard
 from measure.boards.dots import dot_grid
 from measure.boards.marker_grid import marker_grid
 from measure.bounds import bound
+from measure.bundle import Bundled, bundle
 from measure.correction import Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
 from measure.features.conic import Ellipse, fit_ellipse
@@ -37,6 +38,7 @@ __all__ = [
     "ESTIMATORS",
     "BlurredSides",
     "Board",
+    "Bundled",
     "CameraCalibration",
     "Candidate",
     "Correction",
@@ -62,6 +64,7 @@ __all__ = [
     "best_estimator",
     "blurred_sides",
     "bound",
+    "bundle",
     "calibrate_camera",
     "charuco",
     "chessboard",

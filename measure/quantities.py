@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 from imaging.features.kinds import Evaluated, in_image, on_plane
 from imaging.features.measurand import Measurands, dense, measurands
 from imaging.features.placing import Adjustment
-from imaging.features.seen import Seen, unit_normals
+from imaging.features.seen import Seen
 from imaging.geometry.lens import image_centre
 from imaging.models.extremes import extremes_of, with_extremes
 from imaging.pictures import Pictures
@@ -26,6 +26,7 @@ from measure.features.shape import find_shape
 from measure.goodness import WORST
 from scenes import Corner, Picture, Quantity, status
 from scenes.measurands.between import Crossing
+from scenes.measurands.kinds import MEASURANDS
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +126,7 @@ class MeasuredFeatures:
         """How far off the expected ones lines, circles and a board are found, (n, q), numbered as in `Seen`; 0 of
         forms."""
         expected, found = self.known.seen, np.zeros((len(self.status), self.seen.count))
-        normal, edges = unit_normals(self.seen.along), 2 * len(self.names)
-        along = np.einsum("nei,ei->ne", normal, expected.normals)
-        off = np.einsum("nei,nei->ne", normal, self.seen.start - expected.start)
-        sine = np.einsum("ei,nei->ne", expected.normals[:, ::-1] * [-1, 1], normal)
-        found[:, 0:edges:2], found[:, 1:edges:2] = off / along, np.arctan2(sine, along)
+        found[:, : 2 * len(self.names)] = expected.line_errors(self.seen.start, self.seen.along)
         for c, circle in enumerate(self.circles):
             found[:, expected.numbers(c)] = circle.errors
         if self.board is not None:
@@ -291,6 +288,8 @@ def _states(known: Measurands, shape: Shape, circles: tuple[Circles, ...], forms
         columns += [_crossing(shape, names, each) for each in quantity.crossings]
         if any(name in names for name in quantity.edges):
             columns.append(shape.whole)
+        if MEASURANDS[quantity.kind].pictures > 1:
+            columns.append(np.full(len(found), status.AMBIGUOUS))
         if quantity in forms:  # an edge that is not straight does not fit a line: that is what is measured
             columns = [np.where(each == status.MISFIT, status.OK, each) for each in columns]
             columns.append(forms[quantity].state)

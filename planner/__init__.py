@@ -12,6 +12,7 @@ from imaging.features.measurand import required_edges
 from imaging.features.projected_edges import projected_edges
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
+from planner.bundles import BundlePrediction, predict_bundle
 from planner.combining import Combination, combine
 from planner.constraints import Constraints
 from planner.covering import Coverage, coverage
@@ -30,10 +31,12 @@ from planner.views import plan_views
 
 if TYPE_CHECKING:
     from planner.budgeting.budgets import SceneBudget, budget
+    from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
 
 _LATER = {
-    "SceneBudget": "budgets", "budget": "budgets", "CapabilityPlan": "plans", "plan_capability": "plans",
+    "BundleBudget": "bundles", "SceneBudget": "budgets", "budget": "budgets", "bundle_budget": "bundles",
+    "CapabilityPlan": "plans", "plan_capability": "plans",
 }  # fmt: skip
 
 
@@ -49,9 +52,48 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
-    "Aim", "Candidate", "CapabilityPlan", "Choice", "Chosen", "Combination", "Constraints", "Coverage",
-    "EdgePrediction", "Forecast", "Map", "NothingMeasuresAll", "Pictures", "Plan", "Prediction", "Robust",
-    "SceneBudget", "Tolerances", "Varied", "View", "ViewSet", "ViewingSpace", "Views", "budget", "combine",
-    "coverage", "exhaustive", "image", "plan", "plan_capability", "plan_views", "pose_map", "pose_scatter", "predict",
-    "projected_edges", "required_edges", "robust", "variance_map", "variances", "with_choice",
+    "Aim",
+    "BundleBudget",
+    "BundlePrediction",
+    "Candidate",
+    "CapabilityPlan",
+    "Choice",
+    "Chosen",
+    "Combination",
+    "Constraints",
+    "Coverage",
+    "EdgePrediction",
+    "Forecast",
+    "Map",
+    "NothingMeasuresAll",
+    "Pictures",
+    "Plan",
+    "Prediction",
+    "Robust",
+    "SceneBudget",
+    "Tolerances",
+    "Varied",
+    "View",
+    "ViewSet",
+    "ViewingSpace",
+    "Views",
+    "budget",
+    "bundle_budget",
+    "combine",
+    "coverage",
+    "exhaustive",
+    "image",
+    "plan",
+    "plan_capability",
+    "plan_views",
+    "pose_map",
+    "pose_scatter",
+    "predict",
+    "predict_bundle",
+    "projected_edges",
+    "required_edges",
+    "robust",
+    "variance_map",
+    "variances",
+    "with_choice",
 ]  # fmt: skip

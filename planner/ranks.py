@@ -10,12 +10,13 @@ from imaging.features.seen import unit_normals
 from imaging.models.errors import Errors
 from scenes import Corner, status
 from scenes.measurands.between import Crossing
+from scenes.measurands.kinds import MEASURANDS
 from scenes.status import WORST_FIRST
 
-_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _UNPLACED, _CLUTTER, _OK = map(
+_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _ILL_CONDITIONED, _AMBIGUOUS, _UNPLACED, _CLUTTER, _OK = map(
     WORST_FIRST.index,
-    (status.NOT_VISIBLE, status.SHORT, status.LOW_CONTRAST, status.ILL_CONDITIONED, status.UNPLACED, status.CLUTTER,
-     status.OK),
+    (status.NOT_VISIBLE, status.SHORT, status.LOW_CONTRAST, status.ILL_CONDITIONED, status.AMBIGUOUS, status.UNPLACED,
+     status.CLUTTER, status.OK),
 )  # fmt: skip
 MIN_SINE = 0.02  # edges meeting at less than about a degree give a corner that no linear propagation describes
 
@@ -62,6 +63,8 @@ def quantity_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
         lost = ~np.isfinite(evaluated.variances[..., m])
         told = np.where(flat, np.minimum(rank, _ILL_CONDITIONED), np.where(lost, _NOT_VISIBLE, rank))
         told = np.where(unplaced[..., m], np.minimum(told, _UNPLACED), told)
+        if MEASURANDS[quantity.kind].pictures > 1:
+            told = np.minimum(rank, _AMBIGUOUS)
         ranks.append(np.where(rank <= _LOW_CONTRAST, rank, told))
     return np.stack(ranks, -1)
 

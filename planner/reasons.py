@@ -12,7 +12,19 @@ from imaging.models.errors import Errors
 from planner.ranks import MIN_SINE, edge_ranks, least_contrast, sine
 from scenes import Corner
 from scenes.measurands.between import Crossing
-from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, NOT_VISIBLE, OK, SHORT, UNPLACED, WORST_FIRST, allowed
+from scenes.measurands.kinds import MEASURANDS
+from scenes.status import (
+    AMBIGUOUS,
+    CLUTTER,
+    ILL_CONDITIONED,
+    LOW_CONTRAST,
+    NOT_VISIBLE,
+    OK,
+    SHORT,
+    UNPLACED,
+    WORST_FIRST,
+    allowed,
+)
 
 
 def reason(evaluated: Errors, clutter: np.ndarray, bias_image: float, m: int, status: str) -> str:
@@ -33,6 +45,8 @@ def reason(evaluated: Errors, clutter: np.ndarray, bias_image: float, m: int, st
     known = evaluated.measurands
     if status == UNPLACED:
         return _unplaced(evaluated, m)
+    if status == AMBIGUOUS:
+        return alone(known.quantities[m].kind)
     if status == ILL_CONDITIONED:
         return _flattest(evaluated, known.quantities[m].crossings)
     names, ranks = known.view.names, edge_ranks(evaluated, clutter)
@@ -46,6 +60,16 @@ def reason(evaluated: Errors, clutter: np.ndarray, bias_image: float, m: int, st
             return _short_arc(evaluated, rims)
         return f"too little is seen of {_joined(rims or known.quantities[m].edges)}, or it is too faint"
     return {NOT_VISIBLE: _hidden, SHORT: _short, LOW_CONTRAST: _faint}[status](evaluated, guilty)
+
+
+def alone(kind: str) -> str:
+    """Why one picture does not tell a measurand of a kind.
+
+    >>> alone("height")
+    'a height needs at least 2 pictures that are adjusted together'
+    """
+    name = kind.replace("_", " ")
+    return f"a {name} needs at least {MEASURANDS[kind].pictures} pictures that are adjusted together"
 
 
 def _hidden(evaluated: Errors, edges: list[int]) -> str:

@@ -37,7 +37,8 @@ MEANINGS = {
     AMBIGUOUS: "another solution explains the image as well",
     COMPRESSED: "compression (JPEG) has lost what is no noise: the variance is too small",
     CORRELATED: "the noise of neighbouring pixels is not independent: the variance is not exact",
-    UNPLACED: "the datums tell less of the part's place than was known before, and it matters",
+    UNPLACED: "the datums tell less of the part's place than was known before, and it matters; or pictures that are "
+    "adjusted together leave it open",
     MISFIT: "the image is not what the model says within its noise: neither value nor variance can be relied on",
     CLUTTER: "what lies around an edge (another edge, shading, the end of the scale) biases the value",
     TONE_UNKNOWN: "neither file nor picture says whether levels are linear in the light, and it matters",
@@ -51,11 +52,12 @@ REMEDIES = {
     SIGN_CHANGE: "move the lamp until the same side is the brighter one along all of the edge",
     LOW_CONTRAST: "move the lamp, expose longer, or choose another edge",
     ILL_CONDITIONED: "turn the camera, or choose edges that meet at a larger angle",
-    AMBIGUOUS: "give a start nearer to the true pose, or show one more feature",
+    AMBIGUOUS: "give a start nearer to the true pose, show one more feature, or measure several pictures together",
     COMPRESSED: "save pictures without compression (PNG, TIFF)",
     CORRELATED: "save the sensor's own pixels: no colour filter's interpolation, no resizing, no sharpening",
     UNPLACED: "name datums that lie farther apart or at other heights, turn the camera, or say the part's place more "
-    "exactly (`uncertainty.part_shift`, `part_tilt_deg`)",
+    "exactly (`uncertainty.part_shift`, `part_tilt_deg`); of pictures adjusted together take more, or know better "
+    "where sensors stand",
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
     CLUTTER: "move lamp or camera (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",

@@ -74,7 +74,7 @@ class Placing:
         free = np.flatnonzero(u > 0)
         steps = np.where(np.arange(6) < 3, 1.0, np.pi / 180) * u
         with np.errstate(divide="ignore", invalid="ignore"):
-            slopes = _slopes(seen)[..., free] * steps[free]
+            slopes = by_place(seen)[..., free] * steps[free]
             datums, scatter = _datums(scene, seen)
         lead = (
             slopes.shape[:-2] if board is None else board.root.shape[:-2]
@@ -117,12 +117,20 @@ class Placing:
         """
         told = self.datums & np.isfinite(np.einsum("...qq->...q", errors)) & np.isfinite(self.slopes).all(-1)
         whole = np.where(told[..., :, None] & told[..., None, :], errors + self.scatter + self.beside, 0.0)
-        size = np.sqrt(np.einsum("...qq->...q", whole))
-        size = np.where(size > 0, size, 1.0)
-        values, vectors = np.linalg.eigh(whole / (size[..., :, None] * size[..., None, :]))
-        some = values > _NOISELESS
-        scale = np.where(some, 1 / np.sqrt(np.where(some, values, 1.0)), 0.0)
-        return told, scale[..., None] * np.swapaxes(vectors, -1, -2) / size[..., None, :]
+        return told, whitening(whole)
+
+
+def whitening(covariance: np.ndarray) -> np.ndarray:
+    """Combinations (..., q, q) of errors of a covariance (..., q, q) that are independent and of variance 1.
+
+    Rows of zeros where a combination has no noise, or a feature is not told (a row and a column of zeros).
+    """
+    size = np.sqrt(np.einsum("...qq->...q", covariance))
+    size = np.where(size > 0, size, 1.0)
+    values, vectors = np.linalg.eigh(covariance / (size[..., :, None] * size[..., None, :]))
+    some = values > _NOISELESS
+    scale = np.where(some, 1 / np.sqrt(np.where(some, values, 1.0)), 0.0)
+    return scale[..., None] * np.swapaxes(vectors, -1, -2) / size[..., None, :]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,23 +224,28 @@ class Adjustment:
         return (self.pulls(gradient) @ directions) * weak[..., None, :]
 
 
-def _slopes(seen: Seen) -> np.ndarray:
-    """Derivatives of lines and circles by shifts and turns (rad) of the part, (..., q, 6); 0 of forms."""
+def by_place(seen: Seen, pivot: np.ndarray | None = None) -> np.ndarray:
+    """Derivatives of lines and circles by shifts and turns (rad) of the part, (..., q, 6); 0 of forms.
+
+    It turns about a pivot (3,), the point that the camera looks at where none is given.
+    """
+    pivot = np.array(seen.camera.look_at) if pivot is None else pivot
     found = np.zeros((*seen.sensors.shape[:-1], seen.count, 6))
     lengths = np.linalg.norm(seen.along, axis=-1)[..., None]
     for e, name in enumerate(seen.names):
         ends = seen.solid.vertices[list(seen.solid.edge(name).ends)]
-        off = np.einsum("...i,...nij->...nj", seen.normals[..., e, :], _moved(seen, ends))
+        off = np.einsum("...i,...nij->...nj", seen.normals[..., e, :], _moved(seen, ends, pivot))
         found[..., 2 * e, :] = off[..., 0, :]
         found[..., 2 * e + 1, :] = (off[..., 1, :] - off[..., 0, :]) / lengths[..., e, :]
     for c, name in enumerate(seen.circles):
-        found[..., seen.numbers(c), :] = _of_circle(seen, seen.solid.circle(name))
+        circle = seen.solid.circle(name)
+        found[..., seen.numbers(c), :] = of_circle(seen, circle, steps(circle.at(around(circle)), pivot))
     return found
 
 
-def _moved(seen: Seen, points: np.ndarray) -> np.ndarray:
+def _moved(seen: Seen, points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
     """Derivatives of the images of points (n, 3) by the placement, px, (..., n, 2, 6)."""
-    return seen.slopes(points) @ steps(points, np.array(seen.camera.look_at))
+    return seen.slopes(points) @ steps(points, pivot)
 
 
 def steps(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
@@ -241,21 +254,41 @@ def steps(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
     return np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), np.swapaxes(turned, 1, 2)], -1)
 
 
-def _of_circle(seen: Seen, circle: Circle) -> np.ndarray:
-    """Derivatives of a circle's shifts and radius, (..., 3, 6): least squares around its rim, as it is found."""
-    angle = circle.angles(_AROUND)
-    points, radial = circle.at(angle), circle.spokes(angle)
+def of_circle(seen: Seen, circle: Circle, moves: np.ndarray) -> np.ndarray:
+    """Derivatives of a circle's shifts and radius, (..., 3, k), where `around` of it is moved by ``moves`` (n, 3, k):
+    least squares around its rim, as it is found."""
+    across, solve = rim_fit(seen, circle)
+    return solve @ np.einsum("...nj,njk->...nk", across, moves)
+
+
+def rim_fit(seen: Seen, circle: Circle) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of how far the image of `around` a circle is off outwards by these places, px, (..., n, 3), and of
+    the circle's shifts and radius by how far that is, (..., 3, n)."""
+    normal, slopes, speed, radial = _outwards(seen, circle)
     one, two = circle.axes
-    ahead = np.cross(circle.axis, radial)
-    slopes = seen.slopes(points)
-    along = np.einsum("...nij,nj->...ni", slopes, ahead)
-    speed = np.linalg.norm(along, axis=-1, keepdims=True)
-    normal = np.stack([along[..., 1], -along[..., 0]], -1) / speed
     across = np.einsum("...ni,...nij->...nj", normal, slopes)
     design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
-    off = np.einsum("...nj,njk->...nk", across, steps(points, np.array(seen.camera.look_at)))
     weighted = np.swapaxes(design * speed, -1, -2)
-    return np.linalg.solve(weighted @ design, weighted @ off)
+    return across, np.linalg.solve(weighted @ design, weighted)
+
+
+def rim_normals(seen: Seen, circle: Circle) -> np.ndarray:
+    """Unit normals of its image at `around` of it, outwards, (..., n, 2)."""
+    return _outwards(seen, circle)[0]
+
+
+def around(circle: Circle) -> np.ndarray:
+    """Angles of the places of a circle by which its image is told, rad, (n,)."""
+    return circle.angles(_AROUND)
+
+
+def _outwards(seen: Seen, circle: Circle) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of `around`: unit normals of the image, its derivatives by the places, px per rad around, and unit spokes."""
+    points, radial = circle.at(around(circle)), circle.spokes(around(circle))
+    slopes = seen.slopes(points)
+    along = np.einsum("...nij,nj->...ni", slopes, np.cross(circle.axis, radial))
+    speed = np.linalg.norm(along, axis=-1, keepdims=True)
+    return np.stack([along[..., 1], -along[..., 0]], -1) / speed, slopes, speed, radial
 
 
 def _datums(scene: Scene, seen: Seen) -> tuple[np.ndarray, np.ndarray]:

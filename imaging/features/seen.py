@@ -99,10 +99,28 @@ class Seen:
         first = 2 * len(self.names) + sum(self.sizes[:c])
         return slice(first, first + self.sizes[c])
 
+    def of_features(self, some: np.ndarray) -> np.ndarray:
+        """Which parameters, bool (q,), are those of some edges and circles, bool (E + C,)."""
+        which, edges = np.zeros(self.count, bool), len(self.names)
+        which[: 2 * edges] = np.repeat(some[:edges], 2)
+        for c in range(len(self.circles)):
+            which[self.numbers(c)] = some[edges + c]
+        return which
+
     @property
     def normals(self) -> np.ndarray:
         """Unit normal (-t_y, t_x) of each line, shape (..., E, 2)."""
         return unit_normals(self.along)
+
+    def line_errors(self, start: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """How far other lines, through points and along directions (..., E, 2), are off these, (..., 2 E): d, theta."""
+        normal = unit_normals(along)
+        same = np.einsum("...ei,...ei->...e", normal, self.normals)
+        off = np.einsum("...ei,...ei->...e", normal, start - self.start)
+        sine = np.einsum("...ei,...ei->...e", self.normals[..., ::-1] * [-1, 1], normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            errors = np.stack([off / same, np.arctan2(sine, same)], -1)
+        return errors.reshape(*errors.shape[:-2], -1)
 
     @cached_property
     def eye(self) -> np.ndarray:

@@ -85,7 +85,7 @@ class Errors:
     def adjustment(self) -> Adjustment | None:
         """Of the part's place, as this model knows the features; None where it is known."""
         placing = self.measurands.placing
-        return None if placing is None else placing.adjusted(self._of_features())
+        return None if placing is None else placing.adjusted(self.of_features)
 
     @cached_property
     def placed(self) -> np.ndarray:
@@ -95,7 +95,8 @@ class Errors:
             return np.zeros(self.variances_object.shape)
         return np.einsum("...mm->...m", self.adjustment.placed(self.measurands.gradient_object))
 
-    def _of_features(self) -> np.ndarray:
+    @cached_property
+    def of_features(self) -> np.ndarray:
         """Joint covariance (..., q, q) of lines and circles, which are independent."""
         known = self.measurands
         count = len(known.view.names)

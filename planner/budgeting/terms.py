@@ -99,7 +99,7 @@ def unbiased(pictures: Pictures, variances: np.ndarray) -> list[list[Term]]:
         unit, noise = scene.unit_of(quantity), Uncertain(sd=float(np.sqrt(variances[m])), type="A")
         rows = [Term(NOISE, 0.0, noise, unit, 1.0, "noise")]
         rows += [Term(name, 0.0, Uncertain(sd=float(u[m])), unit, 1.0) for name, u in still.items() if u[m] > 0]
-        found.append(rows + _stated(scene, unit, float(known.value_object[m])))
+        found.append(rows + stated(scene, unit, float(known.value_object[m])))
     return found
 
 
@@ -133,7 +133,7 @@ def _model_error(known: Measurands, m: int, each: Forecast, sigma: float, biased
     return MOST * sigma
 
 
-def _stated(scene: Scene, unit: str, value: float) -> list[Term]:
+def stated(scene: Scene, unit: str, value: float) -> list[Term]:
     """Rounding and temperature, as the scene says them."""
     said, angle = scene.uncertainty, unit == "degrees"
     step = said.rounding_deg if angle else said.rounding
@@ -148,20 +148,26 @@ def _stated(scene: Scene, unit: str, value: float) -> list[Term]:
 
 
 def _pattern(pictures: Pictures, known: Measurands) -> np.ndarray:
-    """Standard uncertainty by the fixed pattern, (M,): what noise of that size does, once, and then in all pictures.
+    """Standard uncertainty by the fixed pattern, (M,): what noise of that size does, once, and then in all pictures."""
+    noise = pictures.scene.noise
+    if noise.prnu == 0 and noise.dsnu == 0:
+        return np.zeros(len(known.quantities))
+    still = still_noise(pictures, known)
+    return np.sqrt(variance_model(DEFAULT_MODEL)(pictures.with_noise(still)).variances_object)
+
+
+def still_noise(pictures: Pictures, known: Measurands) -> Noise:
+    """Noise as large as the fixed pattern.
 
     Its part that grows with the level is taken at the root mean square level beside the straight edges, or at the level
     of a white surface where there are none.
     """
     scene, noise = pictures.scene, pictures.scene.noise
-    if noise.prnu == 0 and noise.dsnu == 0:
-        return np.zeros(len(known.quantities))
     signal = scene.camera.exposure
     if known.view.names:
         sides = side_signals(pictures, known.view.names, edge_points(scene.solid, known.view.names, _LOOKED))
         signal = float(np.sqrt(np.nanmean(np.square(sides))))
     dark, bright = (noise.factor(power) for power in (2, 0))
-    still = Noise(
+    return Noise(
         sigma=math.sqrt(dark * noise.dsnu**2 + bright * (noise.prnu * signal) ** 2), dark_level=noise.dark_level
     )
-    return np.sqrt(variance_model(DEFAULT_MODEL)(pictures.with_noise(still)).variances_object)

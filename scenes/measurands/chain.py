@@ -112,6 +112,8 @@ def linked(number: Any, of: tuple[str, ...], minus: tuple[str, ...], known: Mapp
     if own := [term.name for term in terms if MEASURANDS[term.kind].is_form or MEASURANDS[term.kind].extreme]:
         names = ", ".join(own)
         raise ValueError(f"{key}.of must not be forms, largest or smallest, each of a law of its own, got {names}")
+    if own := [term.name for term in terms if MEASURANDS[term.kind].pictures > 1]:
+        raise ValueError(f"{key}.of must be numbers that one picture tells, got {', '.join(own)}")
     if len({term.is_angle for term in terms}) > 1:
         raise ValueError(f"{key}.of must be all lengths or all angles, got {', '.join(of + minus)}")
     features = tuple(dict.fromkeys(feature for term in terms for feature in term.features))

@@ -240,6 +240,44 @@ def _circle_condition(at: np.ndarray, circle: np.ndarray) -> tuple[np.ndarray, n
     return pulls, np.concatenate([pulls.sum(-3), both.sum(-2)[..., None]], -1), (off * both).sum(-2)
 
 
+def plane_through(points: list[Point]) -> tuple[Point, Point]:
+    """The middle of at least three points and the unit normal, of either sign, of their least-squares plane.
+
+    The normal n is the eigenvector of the least eigenvalue of the points' scatter M; it moves by the others e_k, each
+    by (e_k . dM n) / (l_n - l_k).
+    """
+    centre = mean(points)
+    away = np.stack([point.at for point in points], -2) - centre.at[..., None, :]
+    sizes, axes = np.linalg.eigh(np.einsum("...ni,...nj->...ij", away, away))
+    normal, others, gaps = axes[..., 0], axes[..., 1:], sizes[..., :1] - sizes[..., 1:]
+    moves: dict[int, np.ndarray] = {}
+    for i, point in enumerate(points):
+        height = _dot(away[..., i, :], normal)[..., None]
+        for k, move in point.moves.items():
+            scatter = away[..., i, :] * _dot(move, normal)[..., None] + height * move
+            turned = np.einsum("...ik,...i->...k", others, scatter) / gaps
+            moves[k] = moves.get(k, 0.0) + np.einsum("...ik,...k->...i", others, turned)
+    return centre, Point(normal, moves)
+
+
+def over_plane(point: Point, centre: Point, normal: Point, outside: np.ndarray) -> Evaluated:
+    """Height of a point over the plane through another of a unit normal, positive to the side of a vector (3,)."""
+    up = np.sign(_dot(normal.at, outside))[..., None]
+    way = point.at - centre.at
+    parts = (up * normal.at, point.moves), (-up * normal.at, centre.moves), (up * way, normal.moves)
+    return Evaluated(_dot(up * normal.at, way), pulled(parts))
+
+
+def between_planes(normals: list[Point], outside: list[np.ndarray]) -> Evaluated:
+    """180 degrees less the angle between two planes' unit normals, each towards its vector (3,), degrees."""
+    ups = [np.sign(_dot(normal.at, out))[..., None] for normal, out in zip(normals, outside, strict=True)]
+    one, other = (up * normal.at for up, normal in zip(ups, normals, strict=True))
+    sine, cosine = np.linalg.norm(np.cross(one, other), axis=-1), _dot(one, other)
+    opens = (DEGREE / sine)[..., None]
+    parts = (opens * ups[0] * other, normals[0].moves), (opens * ups[1] * one, normals[1].moves)
+    return Evaluated(180.0 - DEGREE * np.arctan2(sine, cosine), pulled(parts))
+
+
 def across(unit: np.ndarray, plane: np.ndarray | None) -> np.ndarray:
     """Unit vector across a direction (..., k): (-y, x) in the image, normal x direction on a plane."""
     if plane is None:

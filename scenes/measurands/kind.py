@@ -70,6 +70,9 @@ class MeasurandKind:
     """Of a chain +1 where it is the largest of its numbers, -1 where it is the smallest: not normal if several may be
     it."""
 
+    pictures: ClassVar[int] = 1
+    """How many pictures, adjusted together (`imaging.bundles`), tell it at least."""
+
     takes_material: ClassVar[bool] = False
     """Whether its zone may grow with a feature's size (`scenes.measurands.material`)."""
 

@@ -3,7 +3,7 @@
 from scenes.measurands import (  # noqa: F401, I001
     distance, width, offset, angle, diameter, radius, taper, position, slot, pitch_circle,
     true_position, concentricity, symmetry, parallelism, perpendicularity, straightness, roundness, profile,
-    chain,
+    height, face_angle, chain,
 )  # fmt: skip
 from scenes.measurands.kind import MEASURANDS, MeasurandKind
 

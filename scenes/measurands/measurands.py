@@ -129,6 +129,9 @@ class Measurand(Model):
     nominal values, or of a ball's centre in the scene's x and y, its z being that of the scene; ``slot`` of two round
     ends, NAME.width and NAME.length; ``pitch_circle`` of at least three circles, its diameter.
 
+    Of several pictures adjusted together, and of none alone: ``height`` of a corner or centre over the plane of at
+    least three others; ``face_angle`` between two faces, of edges two and two.
+
     Geometric tolerances, whose ``tolerance`` is the zone's width or diameter: ``true_position`` of a corner or centre
     in a datum system of two features, an edge and an edge or a point, or a point and a point or an edge, as NAME.x and
     NAME.y; ``concentricity``, also called ``coaxiality``, of two circles, the middle of a slot or the centre of a

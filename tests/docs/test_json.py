@@ -36,6 +36,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "plan --objective capability": ("calibrated_rig", "--objective", "capability", "--step", "45"),
     "render": ("small.toml", *POSES, "-o", "b.png"),
     "measure": ("a.png", "small.toml", *POSES),
+    "measure --together": ("a.png", "small.toml", *POSES, "--also", "a.png 30,135 15,315", "--together", "known"),
     "measure without a scene": ("a.png", "--mtf", "m.png"),
     "fit": ("small.toml", "a.png", *POSES),
     "predict": ("small.toml",),

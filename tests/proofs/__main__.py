@@ -8,6 +8,7 @@ from tests.proofs.affine_fits import affine_fits
 from tests.proofs.arcs import arcs
 from tests.proofs.bias import bias
 from tests.proofs.boards import boards
+from tests.proofs.bundles import bundles
 from tests.proofs.colour import colour
 from tests.proofs.conditions import conditions
 from tests.proofs.corpus import corpus
@@ -46,6 +47,7 @@ app.command()(affine_fits)
 app.command()(arcs)
 app.command()(bias)
 app.command()(boards)
+app.command()(bundles)
 app.command()(colour)
 app.command()(conditions)
 app.command()(corpus)

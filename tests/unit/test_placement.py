@@ -161,7 +161,7 @@ def test_the_adjustment_is_the_most_likely_place_and_its_covariance_is_that_of_d
     picture = _with(block, placement={"datum_sd": sd})
     errors = variance_model("calibrated")(Pictures.of(picture))
     placing, adjustment = errors.measurands.placing, errors.adjustment
-    noise = errors._of_features()
+    noise = errors.of_features
     q, k = placing.slopes.shape
     told = np.flatnonzero(placing.datums & np.isfinite(np.diag(noise)))
     white = np.linalg.inv(np.linalg.cholesky(noise[np.ix_(told, told)]))

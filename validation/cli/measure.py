@@ -15,7 +15,7 @@ from scenes import InvalidInput
 from scenes.files.image import Size
 from scenes.photograph import Photograph
 from scenes.status import is_trusted, legend
-from validation.cli import measurands, photograph, placement, recorded
+from validation.cli import measurands, photograph, placement, recorded, together
 from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say, taking
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
@@ -72,6 +72,13 @@ class Options:
             help='With SCENE: another picture of the part, "FILE SENSOR LIGHT"; each is told by what sees it best.',
         ),
     ] = None
+    together: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help="With --also: adjust all pictures together; sensors' places are known, uncertain or unknown.",
+        ),
+    ] = None
     serial: Annotated[str | None, typer.Option(metavar="TEXT", help="Serial number of the part, for --inspection.")] = (
         None
     )
@@ -96,7 +103,7 @@ class Options:
     def of_scenes(self) -> dict[str, Any]:
         """What is asked of the picture of a scene alone, by option; None or False where it is not."""
         return {"--as-measured": self.as_measured, "--also": self.also, "--inspection": self.inspection,
-                "--serial": self.serial}  # fmt: skip
+                "--serial": self.serial, "--together": self.together}  # fmt: skip
 
 
 @commands.command("measure")
@@ -155,6 +162,10 @@ def _measure_scene(given: Options) -> NoReturn:
     if any(place is not None and not is_trusted(place.status) for place in places):
         _say_lost(given, [place for place in places if place is not None])
     shown = [each if place is None else place.picture for each, place in zip(shown, places, strict=True)]
+    if given.together is not None:
+        _check_together(given)
+        named = [file for file, *_ in files]
+        together.measured(named, images, shown, given.together, given.estimator, as_json=given.as_json)
     inspected = inspection.inspect(*(_measured(given, image, each) for image, each in zip(images, shown, strict=True)))
     if given.inspection is not None:
         from validation.report import inspection_files
@@ -163,6 +174,17 @@ def _measure_scene(given: Options) -> NoReturn:
         inspection_files.write(inspected, images, about, given.inspection)
     first = inspected.taken[0].found.first if known.task is not None and len(files) == 1 else None
     _say_measurands(given, inspected, first, [place for place in places if place is not None])
+
+
+def _check_together(given: Options) -> None:
+    """What pictures that are adjusted together are not asked for."""
+    if given.also is None:
+        raise InvalidInput(f"--together must be used with --also, got {given.together!r} alone")
+    if given.together not in ("known", "uncertain", "unknown"):
+        raise InvalidInput(f"--together must be one of known, uncertain, unknown, got {given.together!r}")
+    for option in ("--inspection", "--as-measured", "--serial"):
+        if given.of_scenes[option]:
+            raise InvalidInput(f"{option} must be left out with --together, got it")
 
 
 def _located(image: np.ndarray, shown: scenes.Picture) -> measure.Located | None:

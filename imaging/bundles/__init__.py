@@ -1,0 +1,1 @@
+"""Several pictures of one part adjusted together (bundle adjustment): its features and the sensors in space."""

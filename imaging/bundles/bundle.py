@@ -1,0 +1,297 @@
+"""The adjustment of several pictures: from what is found in each to the part's features in space, and measurands.
+
+Features of picture v are found off what is expected by y_v = h_v(x) + e_v: x the `Unknowns`, e_v noise of a known
+covariance, h_v exact projection (`imaging.geometry.projection`). The most likely x, given what is known before, is
+found by Gauss-Newton steps with the derivatives at the part and the sensors as they are expected: there whatever the
+pictures cannot tell (where all of it is, its scale where no sensor's place is known) is told by nothing exactly, and
+stays open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from imaging.bundles.cameras import by_camera
+from imaging.bundles.in_space import InSpace
+from imaging.bundles.told import Told
+from imaging.bundles.unknowns import Freedom, Unknowns, rim, rim_moves
+from imaging.features.measurand import measurands
+from imaging.features.placing import around, by_place, of_circle, rim_fit, rim_normals, steps, whitening
+from imaging.features.seen import Seen
+from imaging.geometry.projection import from_axis
+from imaging.pictures import Pictures
+from imaging.placed import difference, placed, turn
+from scenes import InvalidInput, Picture, Quantity, Wall
+from scenes.measurands.form import forms_of
+from scenes.measurands.kinds import MEASURANDS
+
+_STEPS = 20
+_SETTLED = 1e-9  # of a standard deviation of the noise, in any row
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """V pictures of one part.
+
+    Attributes
+    ----------
+    pictures : tuple of Picture
+        As they are expected.
+    freedom : Freedom
+    unknowns : Unknowns
+    seen : tuple of Seen
+        What each is expected to show.
+    moved : ndarray, shape (n,)
+        What of the unknowns the expected pictures have already, beside what the scene says.
+    """
+
+    pictures: tuple[Picture, ...]
+    freedom: Freedom
+    unknowns: Unknowns
+    seen: tuple[Seen, ...]
+    moved: np.ndarray
+
+    @classmethod
+    def of(cls, pictures: Sequence[Picture], freedom: Freedom, moved: np.ndarray | None = None) -> Bundle:
+        """Of pictures of one part with the same measurands, which have some errors (n,) of the unknowns already.
+
+        Raises
+        ------
+        InvalidInput
+            If they are not, or what is measured is not of straight edges and circles.
+        """
+        pictures = tuple(pictures)
+        _check(pictures)
+        each = tuple(Pictures.of(picture) for picture in pictures)
+        seen = tuple(measurands(one).seen for one in each)
+        unknowns = Unknowns.of(pictures[0].scene, each, seen[0], freedom)
+        return cls(pictures, freedom, unknowns, seen, np.zeros(unknowns.count) if moved is None else moved)
+
+    def moved_by(self, numbers: np.ndarray) -> Bundle:
+        """The same with part and sensors expected elsewhere, by the unknowns (n,); lights go with the sensors."""
+        moved, pictures = np.zeros(self.unknowns.count), []
+        for k, picture in enumerate(self.pictures, 1):
+            part, sensor = (_in_degrees(self.unknowns.full(name, numbers)) for name in ("part", f"sensor {k}"))
+            pictures.append(placed(placed(picture, part), difference(np.zeros(6), sensor)))
+        for name in ("part", *(f"sensor {k}" for k in range(1, len(pictures) + 1))):
+            moved[self.unknowns.slices[name]] = numbers[self.unknowns.slices[name]]
+        return Bundle.of(pictures, self.freedom, self.moved + moved)
+
+    def reach(self, numbers: np.ndarray) -> float:
+        """How far unknowns (n,) of the part and the sensors move what is seen of it at most, px."""
+        points, found = self.at(np.zeros(len(numbers))).places(), [0.0]
+        for k, seen in enumerate(self.seen, 1):
+            turned = steps(points, np.array(seen.camera.look_at))
+            full = self.unknowns.full("part", numbers) - self.unknowns.full(f"sensor {k}", numbers)
+            found.append(float(np.linalg.norm(seen.slopes(points) @ (turned @ full)[..., None], axis=-2).max()))
+        return max(found)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What is measured."""
+        return self.unknowns.scene.quantities
+
+    @cached_property
+    def designs(self) -> tuple[np.ndarray, ...]:
+        """Derivatives (q, n) of each picture's lines and circles by the unknowns."""
+        return tuple(_design(self.unknowns, seen, k) for k, seen in enumerate(self.seen, 1))
+
+    def adjusted(self, errors: Sequence[np.ndarray], counts: Sequence[np.ndarray] | None = None) -> BundleAdjustment:
+        """The adjustment of lines and circles whose noise has covariances (q, q), infinite on the diagonal of those
+        that are not found; of those alone that count, bool (q,), where that is said."""
+        whites, told = [], []
+        for k, (design, covariance) in enumerate(zip(self.designs, errors, strict=True)):
+            some = np.isfinite(np.diag(covariance)) & np.isfinite(design).all(1)
+            some = some if counts is None else some & counts[k]
+            told.append(np.where(some[:, None] & some, covariance, 0.0))
+            whites.append(whitening(told[-1]))
+        return BundleAdjustment(self, tuple(whites), tuple(told))
+
+    def expected(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
+        """How far lines and circles (q,) of each picture are off by unknowns (n,) beside those of the pictures."""
+        return tuple(_off(self.unknowns, seen, k, numbers) for k, seen in enumerate(self.seen, 1))
+
+    def at(self, numbers: np.ndarray) -> InSpace:
+        """The features with unknowns (n,) beside what the scene says."""
+        return InSpace(self.unknowns, numbers, self.seen[0].viewpoint)
+
+    @cached_property
+    def nominal(self) -> tuple[np.ndarray, np.ndarray]:
+        """Values (M,) of the part as the scene says it, and their derivatives (M, n) by the unknowns."""
+        return self.at(np.zeros(self.unknowns.count)).evaluated(self.quantities)
+
+    def values(self, numbers: np.ndarray) -> np.ndarray:
+        """Values (M,) with unknowns (n,) beside what the scene says."""
+        return self.at(numbers).aligned().evaluated(self.quantities)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class BundleAdjustment:
+    """What pictures whose noise is known tell of the unknowns.
+
+    Attributes
+    ----------
+    bundle : Bundle
+    whites : tuple of ndarray, shape (q, q)
+        Combinations of each picture's lines and circles of variance 1; rows of zeros of those that do not count.
+    errors : tuple of ndarray, shape (q, q)
+        Their covariances by noise; 0 of those that do not count.
+    """
+
+    bundle: Bundle
+    whites: tuple[np.ndarray, ...]
+    errors: tuple[np.ndarray, ...]
+
+    @cached_property
+    def told(self) -> Told:
+        """By all rows: those of the pictures, then what is known before."""
+        rows = [white @ _finite(design) for white, design in zip(self.whites, self.bundle.designs, strict=True)]
+        return Told(np.concatenate([*rows, self._priors[0]]), self.bundle.unknowns.units)
+
+    @cached_property
+    def is_told(self) -> np.ndarray:
+        """Which values the rows tell, bool (M,)."""
+        return self.told.is_told(self.bundle.nominal[1])
+
+    @cached_property
+    def by_features(self) -> tuple[np.ndarray, ...]:
+        """Derivatives (M, q) of the values by the lines and circles of each picture; of what is not told without
+        meaning."""
+        ends = np.cumsum([0, *(len(white) for white in self.whites)])
+        parts = [self._gain[:, i:j] for i, j in pairwise(ends)]
+        return tuple(part @ white for part, white in zip(parts, self.whites, strict=True))
+
+    @cached_property
+    def by_priors(self) -> dict[str, np.ndarray]:
+        """Derivatives (M, k) of the values by what is not sure before of each block, in units of its standard
+        uncertainty, by its name."""
+        first = sum(len(white) for white in self.whites)
+        return {name: self._gain[:, first + part.start : first + part.stop] for name, part in self._priors[1]}
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Of the values by noise, (M, M); infinite on the diagonal of what is not told, NaN beside it."""
+        parts = zip(self.by_features, self.errors, strict=True)
+        return lost(sum(pull @ error @ pull.T for pull, error in parts), self.is_told)
+
+    @property
+    def known_before(self) -> dict[str, np.ndarray]:
+        """Standard uncertainties (M,) of the values by what is not sure of each block before; infinite of what is not
+        told."""
+        told = self.by_priors.items()
+        return {name: np.where(self.is_told, np.linalg.norm(pull, axis=1), np.inf) for name, pull in told}
+
+    def solved(self, found: Sequence[np.ndarray]) -> tuple[np.ndarray, float]:
+        """The unknowns (n,) beside those of the pictures, of lines and circles found (q,) off what is expected in each
+        picture, and chi-square of the residuals."""
+        numbers, priors = np.zeros(self.bundle.unknowns.count), self._priors[0]
+        found = [np.where(white.any(0), np.nan_to_num(one), 0.0) for white, one in zip(self.whites, found, strict=True)]
+        before = np.inf
+        for _ in range(_STEPS):
+            expected = self.bundle.expected(numbers)
+            rows = [w @ _finite(one - h) for w, one, h in zip(self.whites, found, expected, strict=True)]
+            left = np.concatenate([*rows, -priors @ (numbers + self.bundle.moved)])
+            step = self.told.inverse @ left
+            size = float(np.abs(self.told.rows @ step).max(initial=0.0))
+            if size < _SETTLED or size >= before:
+                break
+            numbers, before = numbers + step, size
+        return numbers, float(left @ left)
+
+    @cached_property
+    def _gain(self) -> np.ndarray:
+        return self.told.gain(self.bundle.nominal[1])
+
+    @cached_property
+    def _priors(self) -> tuple[np.ndarray, list[tuple[str, slice]]]:
+        return self.bundle.unknowns.priors()
+
+
+def lost(covariance: np.ndarray, is_told: np.ndarray) -> np.ndarray:
+    """A covariance (M, M), infinite on the diagonal of what is not told, NaN beside it."""
+    nothing = np.where(np.eye(len(is_told), dtype=bool), np.inf, np.nan)
+    return np.where(is_told[:, None] & is_told, covariance, nothing)
+
+
+def _finite(rows: np.ndarray) -> np.ndarray:
+    """Rows of features that do not count are anything."""
+    return np.where(np.isfinite(rows), rows, 0.0)
+
+
+def _in_degrees(numbers: np.ndarray) -> np.ndarray:
+    """A shift and a turn in rad."""
+    return np.where(np.arange(6) < 3, numbers, np.degrees(numbers))
+
+
+def _design(unknowns: Unknowns, seen: Seen, number: int) -> np.ndarray:
+    """Derivatives (q, n) of lines and circles of the picture of a number by the unknowns."""
+    solid, lengths = seen.solid, np.linalg.norm(seen.along, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        whole = by_place(seen, np.array(unknowns.scene.camera.look_at)) @ unknowns.basis("part")
+        whole = whole - by_place(seen) @ unknowns.basis(f"sensor {number}")
+        whole = whole + by_camera(seen) @ unknowns.basis(unknowns.camera(number))
+        for e, name in enumerate(seen.names):
+            ends = list(solid.edge(name).ends)
+            slopes = np.einsum("i,nij->nj", seen.normals[e], seen.slopes(solid.vertices[ends]))
+            first, last = (
+                slope @ unknowns.basis(unknowns.vertex(end)) for slope, end in zip(slopes, ends, strict=True)
+            )
+            whole[2 * e] += first
+            whole[2 * e + 1] += (last - first) / lengths[e]
+        for c, name in enumerate(seen.circles):
+            circle = solid.circle(name)
+            whole[seen.numbers(c)] += of_circle(seen, circle, rim_moves(circle)) @ unknowns.basis(name)
+    return whole
+
+
+def _off(unknowns: Unknowns, seen: Seen, number: int, numbers: np.ndarray) -> np.ndarray:
+    """How far lines and circles (q,) are off in the picture of a number, by exact projection."""
+    solid, off = seen.solid, np.zeros(seen.count)
+    ends = np.array([_ends(unknowns, name, numbers) for name in seen.names]).reshape(-1, 2, 3)
+    image = _projected(unknowns, seen, number, numbers, ends.reshape(-1, 3)).reshape(-1, 2, 2)
+    off[: 2 * len(ends)] = seen.line_errors(image[:, 0], image[:, 1] - image[:, 0])
+    for c, name in enumerate(seen.circles):
+        circle = solid.circle(name)
+        there = _projected(unknowns, seen, number, numbers, rim(circle, unknowns.full(name, numbers)))
+        here = from_axis(circle.at(around(circle)), seen.sensors, seen.camera)
+        normal = rim_normals(seen, circle)
+        off[seen.numbers(c)] = rim_fit(seen, circle)[1] @ np.einsum("ni,ni->n", normal, there - here)
+    camera = unknowns.full(unknowns.camera(number), numbers)
+    return off + by_camera(seen) @ camera if camera.any() else off
+
+
+def _ends(unknowns: Unknowns, name: str, numbers: np.ndarray) -> np.ndarray:
+    solid = unknowns.scene.solid
+    ends = solid.edge(name).ends
+    return np.array([solid.vertices[end] + unknowns.full(unknowns.vertex(end), numbers) for end in ends])
+
+
+def _projected(unknowns: Unknowns, seen: Seen, number: int, numbers: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Image points (n, 2) of places (n, 3) on the part that is moved, before the sensor that is."""
+    part, sensor = unknowns.full("part", numbers), unknowns.full(f"sensor {number}", numbers)
+    pivot, own = np.array(unknowns.scene.camera.look_at), np.array(seen.camera.look_at)
+    there = (points - pivot) @ turn(np.degrees(part[3:])).T + pivot + part[:3]
+    before = (there - own - sensor[:3]) @ turn(np.degrees(sensor[3:])) + own
+    return from_axis(before, seen.sensors, seen.camera)
+
+
+def _check(pictures: tuple[Picture, ...]) -> None:
+    if not pictures:
+        raise InvalidInput("pictures must be at least one, got none")
+    first = pictures[0].scene
+    for each in pictures[1:]:
+        if each.scene.quantities != first.quantities or each.scene.object != first.object:
+            raise InvalidInput("pictures must be of one part with the same measurands, got others")
+    for each in first.quantities:
+        curved = any(isinstance(feature, Wall) for feature in each.basic)
+        if curved or MEASURANDS[each.kind].extreme or forms_of((each,)):
+            raise InvalidInput(
+                f"measurands must be of straight edges and circles for several pictures, got {each.name}"
+            )
+    if first.placement.board is not None:
+        raise InvalidInput("placement.from must be known, uncertain or datums for several pictures, got 'board'")

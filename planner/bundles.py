@@ -1,0 +1,160 @@
+"""How precisely several pictures, adjusted together, will let the scene's quantities be measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from imaging.bundles.bundle import Bundle
+from imaging.bundles.preferred import Preferred
+from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
+from imaging.features.circles import LEAST_SEEN
+from imaging.models import DEFAULT_MODEL, ModelName, variance_model
+from imaging.models.bias import cluttered
+from imaging.models.errors import Errors
+from imaging.pictures import Pictures
+from planner.ranks import edge_ranks
+from scenes import InvalidInput, Picture, Quantity, status
+from scenes.results import Shown, finite
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BundlePrediction(Shown):
+    """M quantities of V pictures adjusted together.
+
+    Attributes
+    ----------
+    quantities : tuple of Quantity
+    units : tuple of str
+        Of the values: the scene's unit of length, or degrees.
+    value : ndarray, shape (M,)
+        The object's own.
+    covariance : ndarray, shape (M, M)
+        Joint covariance (not sigmas) by noise; infinite on the diagonal of what is not told, NaN beside it.
+    known_before : dict
+        Standard uncertainties (M,) by what is not known before of the ``part``, of ``sensor 1``, ..., of datums.
+    status : tuple of str
+        As of `measure.bundle`; ``glanced`` in place of ``ok`` where nobody has looked for a bias.
+    reason : tuple of str
+        Why it is not told; empty where it is.
+    pictures : tuple of Picture
+    preferred : Preferred
+        The adjustments, with the values' derivatives by lines and circles of each picture.
+    """
+
+    quantities: tuple[Quantity, ...]
+    units: tuple[str, ...]
+    value: np.ndarray
+    covariance: np.ndarray
+    known_before: dict[str, np.ndarray]
+    status: tuple[str, ...]
+    reason: tuple[str, ...]
+    pictures: tuple[Picture, ...]
+    preferred: Preferred
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """Standard deviations by noise, (M,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def u_placed(self) -> np.ndarray:
+        """Standard uncertainties (not variances) by all that is not known before, (M,)."""
+        told = np.where(np.isfinite(np.diag(self.covariance)), 0.0, np.inf)
+        return np.sqrt(sum((each**2 for each in self.known_before.values()), told))
+
+    @property
+    def u(self) -> np.ndarray:
+        """Of both together, (M,)."""
+        return np.hypot(self.sigma, self.u_placed)
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One record a quantity."""
+        columns = zip(
+            self.quantities, self.units, self.value, self.sigma, self.u_placed, self.u, self.status, strict=True
+        )
+        return [
+            {
+                "scene": self.pictures[0].scene.name, "pictures": len(self.pictures), "name": each.name,
+                "kind": each.kind, "unit": unit, "value": float(value), "sigma": finite(sigma),
+                "u_placed": finite(placed), "u": finite(u), "status": state,
+            }
+            for each, unit, value, sigma, placed, u, state in columns
+        ]  # fmt: skip
+
+    def _line(self) -> str:
+        told = (f"{row['name']} u {row['u']:.3g} {row['unit']}" for row in self.as_rows() if row["u"] is not None)
+        return f"{len(self.pictures)} pictures: {'; '.join(told)}"
+
+
+def predict_bundle(
+    pictures: Sequence[Picture],
+    sensors: Sensors | tuple[Sensors, ...] = "uncertain",
+    *,
+    shape: Shape = "in_space",
+    axes: Axes = "known",
+    cameras: Cameras = "one",
+    model: ModelName = DEFAULT_MODEL,
+    close: bool = True,
+) -> BundlePrediction:
+    """Predict several pictures of one part that are adjusted together, its own features the ties.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+    sensors, shape, axes, cameras
+        What is not known before (`imaging.bundles.unknowns.Freedom`).
+    model : {"calibrated", "paper"}
+        Of the lines' and circles' variances.
+    close : bool
+        Whether biases are looked for (ray tracing), which leaves out what is ``clutter`` wherever that can be done.
+
+    Raises
+    ------
+    InvalidInput
+        If the pictures are not of one part with the same measurands, or an argument is none of its choices.
+
+    Examples
+    --------
+    >>> import scenes
+    >>> plate = scenes.load("plate")
+    >>> two = [Picture.of(plate, sensor, (20, 225)) for sensor in ((30, 60), (30, 240))]
+    >>> told = predict_bundle(two, "known")
+    >>> told.status[0], bool(told.sigma[0] > 0)
+    ('ok', True)
+    """
+    if model not in ("calibrated", "paper"):
+        raise InvalidInput(f"model must be one of calibrated, paper for several pictures, got {model!r}")
+    bundle = Bundle.of(pictures, Freedom(sensors, shape, axes, cameras))
+    each = [variance_model(model)(Pictures.of(picture)) for picture in bundle.pictures]
+    states = [_states(errors, picture, close=close) for errors, picture in zip(each, bundle.pictures, strict=True)]
+    chosen = Preferred.of(bundle, [errors.of_features for errors in each], states)
+    said = chosen.statuses(states)
+    scene = bundle.unknowns.scene
+    return BundlePrediction(
+        quantities=bundle.quantities,
+        units=tuple(scene.unit_of(quantity) for quantity in bundle.quantities),
+        value=bundle.nominal[0],
+        covariance=chosen.covariance,
+        known_before=chosen.known_before,
+        status=said if close else tuple(status.GLANCED if each == status.OK else each for each in said),
+        reason=chosen.reasons,
+        pictures=bundle.pictures,
+        preferred=chosen,
+    )
+
+
+def _states(errors: Errors, picture: Picture, *, close: bool) -> np.ndarray:
+    """Status of each edge and circle of one picture, (E + C,)."""
+    known = errors.measurands
+    clutter = cluttered(Pictures.of(picture)) if close else np.zeros(len(known.view.names), bool)
+    edges = [status.WORST_FIRST[rank] for rank in edge_ranks(errors, clutter)]
+    rims = []
+    for covariance, left, crowded in zip(errors.circles, errors.left, errors.crowded, strict=True):
+        seen = np.isfinite(np.diag(covariance)).all()
+        rims.append(status.SHORT if left < LEAST_SEEN else status.NOT_VISIBLE if not seen else
+                    status.CLUTTER if crowded else status.OK)  # fmt: skip
+    return np.array([*edges, *rims])
