@@ -76,7 +76,7 @@ def test_verdict_pictures_and_no_network(found, page):
     read = Page(page.read_text())
     assert read.verdict == found[0].verdict.text
     assert read.outside == []
-    assert len(read.pictures) == 7  # the part, two sketches, scatter, bias, distributions, budget
+    assert len(read.pictures) == 8  # the part, two sketches, scatter, bias, distributions, budget, time
     for picture in read.pictures:
         assert picture["role"] == "img"
         assert len(picture["aria-label"]) > 20
