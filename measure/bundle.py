@@ -13,6 +13,7 @@ from imaging.bundles.bundle import Bundle
 from imaging.bundles.preferred import Preferred
 from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
 from measure.best import best_estimator
+from measure.covariances import of_measured
 from measure.goodness import WORST
 from measure.measurement import checked_image
 from measure.quantities import MeasuredFeatures, find
@@ -224,8 +225,7 @@ def _gathered(expected: Bundle, every: list[_One], lead: tuple[int, ...]) -> Bun
         q.nominal if q.nominal is not None else v for q, v in zip(expected.quantities, expected.nominal[0], strict=True)
     ]
     has = np.array([np.isin(one.status, _VALUED) for one in every])
-    nothing = np.where(np.eye(count, dtype=bool), np.inf, np.nan)
-    covariance = np.where(has[:, :, None] & has[:, None, :], [one.chosen.covariance for one in every], nothing)
+    covariance = of_measured(np.array([one.chosen.covariance for one in every]), has)
     before = [one.chosen.known_before for one in every]
     return Bundled(
         quantities=expected.quantities,

@@ -63,8 +63,7 @@ class BundlePrediction(Shown):
     @property
     def u_placed(self) -> np.ndarray:
         """Standard uncertainties (not variances) by all that is not known before, (M,)."""
-        told = np.where(np.isfinite(np.diag(self.covariance)), 0.0, np.inf)
-        return np.sqrt(sum((each**2 for each in self.known_before.values()), told))
+        return self.preferred.u_placed
 
     @property
     def u(self) -> np.ndarray:

@@ -10,6 +10,7 @@ from imaging.geometry.lens import image_centre, lens_jacobian, recorded
 from imaging.geometry.projection import from_axis
 from scenes import Camera, Scene
 from scenes.cameras.covariance import ORDER
+from scenes.cameras.lens import by_coefficients
 
 _ALONG = np.linspace(0.0, 1.0, 11)  # of a line's image
 
@@ -38,16 +39,11 @@ def shifts(images: np.ndarray, camera: Camera) -> np.ndarray:
     OpenCV's.
     """
     ideal, focal = images + image_centre(camera), camera.focal_px
-    x, y = np.moveaxis(images / focal, -1, 0)
-    there, square = recorded(ideal, camera) - image_centre(camera), x**2 + y**2
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    columns = [
-        (there[:, 0] / focal, zero), (zero, there[:, 1] / focal), (one, zero), (zero, one),
-        (focal * x * square, focal * y * square), (focal * x * square**2, focal * y * square**2),
-        (focal * 2 * x * y, focal * (square + 2 * y**2)), (focal * (square + 2 * x**2), focal * 2 * x * y),
-        (focal * x * square**3, focal * y * square**3),
-    ]  # fmt: skip
-    moved = np.stack([np.stack(column, -1) for column in columns], -1)
+    there = recorded(ideal, camera) - image_centre(camera)
+    zero, one = np.zeros(len(ideal)), np.ones(len(ideal))
+    columns = (there[:, 0] / focal, zero), (zero, there[:, 1] / focal), (one, zero), (zero, one)
+    pinhole = np.stack([np.stack(column, -1) for column in columns], -1)
+    moved = np.concatenate([pinhole, focal * by_coefficients(images / focal)], -1)
     return np.linalg.solve(lens_jacobian(ideal, camera), moved)
 
 

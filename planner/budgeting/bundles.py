@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -108,14 +108,10 @@ def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[So
             ahead, behind = features.errors([each.moved(here, step), each.moved(here, -step)])
             name = f"{each.name} {k + 1}" if of_sensor else each.name
             slope = pulled(pull, ((ahead - behind) / (2 * step))[None])[0]
-            found[name] = _renamed(each, name), found[name][1] + slope if name in found else slope
+            found[name] = replace(each, name=name), found[name][1] + slope if name in found else slope
     count = len(told.quantities)
     slopes = np.stack([slope for _, slope in found.values()], -1) if found else np.zeros((count, 0))
     return tuple(source for source, _ in found.values()), slopes
-
-
-def _renamed(source: Source, name: str) -> Source:
-    return Source(name, source.value, source.told, source.unit, source.kind, source.scale, source.moved)
 
 
 def _terms(told: BundlePrediction) -> list[list[Term]]:

@@ -97,6 +97,15 @@ class Lens(LensModel):
         return np.stack(rows, -2)
 
 
+_UNITS = tuple(Lens(distortion=tuple(row)) for row in np.eye(COEFFICIENTS).tolist())
+
+
+def by_coefficients(points: np.ndarray) -> np.ndarray:
+    """Derivative (..., 2, 5) of where `Lens` records points (..., 2), in focal lengths, by its coefficients, in which
+    it is linear."""
+    return np.stack([lens.bent(points) - points for lens in _UNITS], -1)
+
+
 @lru_cache(maxsize=16)
 def _fold(k1: float, k2: float, k3: float) -> float:
     """Squared radius at which r (1 + k1 r^2 + k2 r^4 + k3 r^6) stops growing; infinite where it never does."""

@@ -149,6 +149,8 @@ def _measure_scene(given: Options) -> NoReturn:
         raise InvalidInput("--sensor must be given with a scene, got nothing")
     if given.lens is not None:
         raise InvalidInput(f"--lens must be left out with a scene, whose camera is a pinhole, got {given.lens}")
+    if given.together is not None:
+        _check_together(given)
     poses = parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
     from validation import inspection, picture_file
 
@@ -163,7 +165,6 @@ def _measure_scene(given: Options) -> NoReturn:
         _say_lost(given, [place for place in places if place is not None])
     shown = [each if place is None else place.picture for each, place in zip(shown, places, strict=True)]
     if given.together is not None:
-        _check_together(given)
         named = [file for file, *_ in files]
         together.measured(named, images, shown, given.together, given.estimator, as_json=given.as_json)
     inspected = inspection.inspect(*(_measured(given, image, each) for image, each in zip(images, shown, strict=True)))
