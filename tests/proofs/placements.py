@@ -11,7 +11,10 @@ Two controls must fail: values with the variance of a known place, and variances
 from __future__ import annotations
 
 import tempfile
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +26,7 @@ import render
 from imaging.features.kinds import on_plane
 from imaging.placed import difference
 from measure.quantities import find, values
-from scenes import Picture, Scene
+from scenes import Picture
 from scenes.status import is_trusted
 from tests import placements as placed_parts
 from tests import printed
@@ -42,6 +45,8 @@ class Pulls:
         deviations).
     place, values, at_known : list of ndarray
         Pulls of shift and rotation, of the values, and of these with the variance of a known place.
+    names : tuple of str
+        Of the values.
     """
 
     tried: int = 0
@@ -50,6 +55,13 @@ class Pulls:
     place: list[np.ndarray] = field(default_factory=list)
     values: list[np.ndarray] = field(default_factory=list)
     at_known: list[np.ndarray] = field(default_factory=list)
+    names: tuple[str, ...] = ()
+
+    def __add__(self, other: Pulls) -> Pulls:
+        """Those of both."""
+        counts = (getattr(self, each) + getattr(other, each) for each in ("tried", "refused", "wrong"))
+        lists = (getattr(self, each) + getattr(other, each) for each in ("place", "values", "at_known"))
+        return Pulls(*counts, *lists, names=self.names or other.names)
 
 
 def one(picture: Picture, rng: np.random.Generator, found: Pulls) -> None:
@@ -81,13 +93,13 @@ def _at_known(image: np.ndarray, picture: Picture) -> np.ndarray:
     return np.sqrt(np.diag(values(told.seen, told.known.quantities, on_plane, told.errors).covariance[0]))
 
 
-def summary(name: str, scene: Scene, found: Pulls) -> bool:
+def summary(name: str, found: Pulls) -> bool:
     """Printed, and whether it is as told."""
     good = found.tried - found.refused - found.wrong
     print(f"{name}: {good} of {found.tried} found, {found.refused} refused, {found.wrong} wrong")
     place, of_values = np.array(found.place), np.array(found.values)
     rows = [*zip(("x", "y", "z", "rx", "ry", "rz"), place.T, strict=True),
-            *zip([each.name for each in scene.quantities], of_values.T, strict=True)]  # fmt: skip
+            *zip(found.names, of_values.T, strict=True)]  # fmt: skip
     for label, pull in rows:
         print(f"  {label:8} mean {pull.mean():+.3f}  spread {pull.std(ddof=1):.3f}")
     control = np.array(found.at_known).std(0, ddof=1)
@@ -120,23 +132,31 @@ def is_as_told(pull: np.ndarray) -> bool:
     return bool(abs(pull.std() - 1) < SPREAD and abs(pull.mean()) < MEAN)
 
 
+def of_places(name: str, board: str, seed: int, places: range) -> Pulls:
+    """Of one part's places of these numbers; each has a generator of its own."""
+    found, k = Pulls(), list(placed_parts.CORNERS).index(name)
+    with tempfile.TemporaryDirectory() as folder:
+        scene = printed.scene(Path(folder), name, board) if board else placed_parts.scene(Path(folder), name)
+        picture = Picture.of(scene, placed_parts.SENSOR, placed_parts.LIGHT)
+        for i in places:
+            one(picture, np.random.default_rng((seed, k, i)), found)
+        found.names = tuple(each.name for each in scene.quantities)
+    return found
+
+
 def placements(
     places: Annotated[int, typer.Option(help="Places of each part.")] = 334,
     seed: Annotated[int, typer.Option()] = 1,
     only: Annotated[str, typer.Option(help="Parts whose names begin so.")] = "",
     board: Annotated[str, typer.Option(help="chessboard or dots: they tell the place.")] = "",
+    jobs: Annotated[int, typer.Option(help="Processes.")] = 1,
 ) -> None:
-    """Three parts at 1000 random places: found, and place and values as well known as told; an hour."""
+    """Three parts at 1000 random places: found, and place and values as well known as told; an hour of a processor."""
     every, good = [], True
-    with tempfile.TemporaryDirectory() as folder:
-        for k, name in enumerate(placed_parts.CORNERS):
-            if not name.startswith(only):
-                continue
-            made = printed.scene(Path(folder), name, board) if board else placed_parts.scene(Path(folder), name)
-            scene, found = made, Pulls()
-            picture, rng = Picture.of(scene, placed_parts.SENSOR, placed_parts.LIGHT), np.random.default_rng((seed, k))
-            for _ in range(places):
-                one(picture, rng, found)
-            good &= summary(name, scene, found)
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        for name in [each for each in placed_parts.CORNERS if each.startswith(only)]:
+            shares = [range(at, places, 4 * jobs) for at in range(min(4 * jobs, places))]
+            found = sum(pool.map(partial(of_places, name, board, seed), shares), Pulls())
+            good &= summary(name, found)
             every.append(found)
     raise typer.Exit(0 if held(every) and good else 1)
