@@ -75,8 +75,8 @@ def main(names: list[str]) -> None:
                 first = image if first is None else first
                 off = (image - first) / np.sqrt(sensor.recorded(picture.scene.noise, first).noise_variance)
                 print(
-                    f"{name:<13}{image.shape[1]:5d} x {image.shape[0]:<5d}{variant:<14}first {seconds[0]:6.2f} s   again "
-                    f"{np.median(seconds[1:]):6.2f} s   off scalar {np.sqrt(np.mean(off**2)):.4f} sigma",
+                    f"{name:<13}{image.shape[1]:5d} x {image.shape[0]:<5d}{variant:<14}first {seconds[0]:6.2f} s   "
+                    f"again {np.median(seconds[1:]):6.2f} s   off scalar {np.sqrt(np.mean(off**2)):.4f} sigma",
                     flush=True,
                 )
 

@@ -79,8 +79,8 @@ class Recorder:
     def _call(self, code: CodeType, held: dict[str, Any], gave: Any) -> Call:
         count = code.co_argcount + code.co_kwonlyargcount
         given = code.co_varnames[:count]
-        # what a comprehension uses, too: until Python 3.12 that is shared with a function of its own
-        way = sorted({*code.co_varnames[count:], *code.co_cellvars}.intersection(held).difference(given, ("__class__",)))
+        own = {*code.co_varnames[count:], *code.co_cellvars}  # cells: until Python 3.12 what comprehensions use, too
+        way = sorted(own.intersection(held).difference(given, ("__class__",)))
         of = self._digester.of
         outer = together("call", [of(gave), *(of(held[name]) for name in given if name in held)])
         return outer, together("way", [of(held[name]) for name in way])
