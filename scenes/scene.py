@@ -14,23 +14,21 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, PlainSerializer, Tag, model_validator
 
 from scenes.cameras import CAMERAS, LENSES, AnyCamera
-from scenes.cameras.binning import binned
-from scenes.cameras.colour import Colour
-from scenes.cameras.data_sheet import completed
 from scenes.cameras.noise import Noise
 from scenes.changes import changed
+from scenes.consistency import check_consistent
 from scenes.errors import InvalidInput
 from scenes.influences import INFLUENCES
 from scenes.lights import LIGHTS, AnyLight
-from scenes.lights.filters import Filter, Lamp, check_names
+from scenes.lights.filters import Filter, Lamp
 from scenes.materials.kinds import MATERIALS, AnyMaterial
 from scenes.materials.on_faces import AnyFaceMaterial
 from scenes.materials.surfaces import Surfaces, surfaces
-from scenes.materials.textures import Texture, check_textures
-from scenes.measurands.features import Basic, Corner, Wall, check_feature
+from scenes.materials.textures import Texture
+from scenes.measurands.features import Basic, Wall
 from scenes.measurands.kinds import MEASURANDS
 from scenes.measurands.material import material_of
-from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, check_quantity, quantities_of
+from scenes.measurands.measurands import Locator, Measurand, Quantity, Task, quantities_of
 from scenes.measurands.zone import Zone
 from scenes.model import FileName, Model, Title, rebuild
 from scenes.parts.ball import Ball
@@ -40,17 +38,15 @@ from scenes.parts.part_file import PartFile, with_walls
 from scenes.parts.solid import Solid, assembled
 from scenes.parts.step_file import Step
 from scenes.parts.turned import Turned
-from scenes.placement import Placement, check_placement, datums_of
+from scenes.placement import Placement, datums_of
 from scenes.pose import Pose, PoseField, pairs, several
 from scenes.ranges import Positive
 from scenes.results import html_of
+from scenes.spellings import in_full
 from scenes.surroundings import Floor, Jitter, Obstacle
-from scenes.uncertain import UncertainNumber, check_uncertain, taken_out
+from scenes.uncertain import UncertainNumber
 from scenes.uncertainty import Uncertainty
-from scenes.units import UNITS, Unit
-from scenes.view import check_view
-
-MOST_LIGHTS = 16
+from scenes.units import Unit
 
 
 def _tag_of_object(value: Any) -> str:
@@ -215,7 +211,7 @@ class Scene(Model):
     @property
     def solid(self) -> Solid:
         """Vertices, faces and edges of the object; of a part from a file the curved surfaces that are measured."""
-        solid, names = self.object.solid_in(self.units), self._walls
+        solid, names = self.object.solid_in(self.units), self.measured_walls
         return with_walls(solid, self.object.curved_in(self.units), names) if names else solid
 
     @property
@@ -228,7 +224,7 @@ class Scene(Model):
         return with_walls(solid, walls) if walls else solid
 
     @property
-    def _walls(self) -> tuple[str, ...]:
+    def measured_walls(self) -> tuple[str, ...]:
         """The curved surfaces of a part from a file that the measurands are about."""
         if not isinstance(self.object, PartFile):
             return ()
@@ -327,77 +323,12 @@ class Scene(Model):
 
     @model_validator(mode="before")
     @classmethod
-    def _one_dark_level(cls, data: Any) -> Any:
-        """Older files call the level of darkness ``camera.black_level``."""
-        camera, noise = (data.get(key) if isinstance(data, dict) else None for key in ("camera", "noise"))
-        if not (isinstance(camera, dict) and isinstance(noise, dict) and "black_level" in camera):
-            return data
-        level = camera["black_level"]
-        if noise.get("dark_level", level) != level:
-            raise ValueError(f"noise.dark_level must be camera.black_level ({level}), got {noise['dark_level']}")
-        rest = {key: value for key, value in camera.items() if key != "black_level"}
-        return {**data, "camera": rest, "noise": {**noise, "dark_level": level}}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _noise_of_its_locator(cls, data: Any) -> Any:
-        """What demosaiced noise is told for: `Locator.scale_px`."""
-        noise, locator = (data.get(key) if isinstance(data, dict) else None for key in ("noise", "locator"))
-        colour = noise.get("colour") if isinstance(noise, dict) else getattr(noise, "colour", None)
-        if not isinstance(colour, dict | Colour):
-            return data
-        scale = locator.get("scale_px") if isinstance(locator, dict) else getattr(locator, "scale_px", None)
-        scale = Locator().scale_px if scale is None else scale
-        if isinstance(colour, dict) and colour.get("scale_px", scale) != scale:
-            raise ValueError(
-                f"noise.colour.scale_px must be locator.scale_px ({scale}) or left out, got {colour['scale_px']}"
-            )
-        told = {**colour, "scale_px": scale} if isinstance(colour, dict) else colour.tried(scale_px=scale)
-        noise = {**noise, "colour": told} if isinstance(noise, dict) else noise.tried(colour=told)
-        return {**data, "noise": noise}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _as_on_a_data_sheet(cls, data: Any) -> Any:
-        """What a camera's data sheets say of its focal length in px, its width, height and distance."""
-        camera = data.get("camera") if isinstance(data, dict) else None
-        unit = data.get("units", "cm") if isinstance(data, dict) else None
-        if not isinstance(camera, dict) or unit not in UNITS:
-            return data
-        return {**data, "camera": completed(camera, unit)}
-
-    @model_validator(mode="before")
-    @classmethod
-    def _of_squares_of_pixels(cls, data: Any) -> Any:
-        """What binning makes of a sensor's pixels."""
-        return binned(data) if isinstance(data, dict) else data
-
-    @model_validator(mode="before")
-    @classmethod
-    def _with_plain_numbers(cls, data: Any) -> Any:
-        """First of all: numbers that carry an uncertainty become plain ones, for whatever looks at them next."""
-        return taken_out(data) if isinstance(data, dict) else data
+    def _in_full(cls, data: Any) -> Any:
+        return in_full(data) if isinstance(data, dict) else data
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        mesh = self.object if isinstance(self.object, Mesh) else None
-        check_view(self.solid, self.camera, self.units, mesh and mesh.units, mesh is not None)
-        self._check_measurands()
-        self._check_surroundings()
-        self._check_lights()
-        check_names("lamps", self.lamps)
-        check_names("filters", self.filters)
-        _ = self.surfaces  # names of faces
-        self._check_curved()
-        self._check_colour()
-        self._check_forms()
-        check_placement(self)
-        check_textures(self.textures, self.solid)
-        check_uncertain(self, self.uncertain)
-        self.uncertainty.check_once(self.uncertain)
-        for i, setting in enumerate(self.settings):
-            self.check_pose("sensor", setting.sensor, f"settings[{i}].sensor")
-            self.check_lights(setting.lights, f"settings[{i}].light")
+        check_consistent(self)
         return self
 
     def check_lights(self, poses: tuple[Any, ...], key: str = "light") -> tuple[Pose, ...]:
@@ -412,96 +343,6 @@ class Scene(Model):
             raise InvalidInput(f"{key} must be {len(self.free)} pose(s), one for each free light, got {len(poses)}")
         keys = [f"{key}[{i}]" if len(poses) > 1 else key for i in range(len(poses))]
         return tuple(self.check_pose("light", *each) for each in zip(poses, keys, self.free, strict=True))
-
-    def _check_lights(self) -> None:
-        """Either ``light`` or ``lights``; those that are fixed stand clear of the object."""
-        if (self.light is None) == (not self.several_lights):
-            raise ValueError(f"light or lights must be given, not both, got {'both' if self.light else 'none'}")
-        if len(self.lights) > MOST_LIGHTS:
-            raise ValueError(f"lights must be at most {MOST_LIGHTS}, got {len(self.lights)}")
-        if not any(light.intensity > 0 for light in self.lights):
-            raise ValueError(
-                f"{'lights' if self.several_lights else 'light'}.intensity must be more than 0 once, got 0"
-            )
-        for i, light in enumerate(self.lights):
-            if light.pose is not None and not light.faces_sensor:
-                self.check_pose("light", light.pose, f"lights[{i}].pose" if self.several_lights else "light.pose", i)
-
-    def _check_measurands(self) -> None:
-        """``task`` or ``measurands``, not both, of features that the object has; a scene without is only looked at."""
-        if self.task is not None and self.measurands:
-            raise ValueError("task or measurands must be given, not both, got both")
-        names = [quantity.name for quantity in quantities_of(self.task, self.measurands)]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"measurands must have different names, got {name!r} twice")
-        if self.task is not None:
-            self._check_task(self.task)
-        whole = self.all_walls if self._walls else self.solid
-        for i, measurand in enumerate(self.measurands):
-            for k, feature in enumerate(measurand.features):
-                check_feature(whole, f"measurands[{i}].features[{k}]", feature)
-            for quantity in measurand.quantities:
-                check_quantity(self.solid, f"measurands[{i}].features", quantity)
-        _ = self.zones  # what some grow with
-
-    def _check_task(self, task: Task) -> None:
-        for end, feature in zip(("start", "end"), task.corners, strict=False):
-            check_feature(self.solid, f"task.{end}", feature)
-        if task.kind == "angle":
-            known = [edge.name for edge in self.solid.sharp]
-            for name in task.lines:
-                if name not in known:
-                    raise ValueError(f"task.lines must be edges ({', '.join(known)}), got {name!r}")
-            if task.lines[0] == task.lines[1]:
-                raise ValueError(f"task.lines must be two different edges, got {list(task.lines)}")
-            check_quantity(self.solid, "task.lines", task.quantity)
-        elif task.start == task.end or (getattr(task.start, "vertex", 0) == getattr(task.end, "vertex", 1)):
-            key = "vertex" if isinstance(task.end, Corner) else "circle"
-            raise ValueError(
-                f"task.end.{key} must be another {key} than task.start.{key}, got {getattr(task.end, key)!r}"
-            )
-
-    def _check_curved(self) -> None:
-        """What limbs are not known with."""
-        if not self.solid.curved:
-            return
-        if self.camera.lens.bends:
-            raise ValueError("camera.lens must be without distortion for a curved object, got one that bends")
-        if self.textures:
-            raise ValueError(f"textures must be none for a curved object, got {len(self.textures)}")
-
-    def _check_forms(self) -> None:
-        """The law of a form's size takes its points' errors for those of independent pixels."""
-        forms = [each.name for each in self.measurands if MEASURANDS[each.kind].is_form]
-        if self.noise.is_shared and forms:
-            raise ValueError(f"noise.row_sigma and column_sigma must be 0 for forms, got some with {', '.join(forms)}")
-
-    def _check_colour(self) -> None:
-        """The picture is not sharper than demosaicing leaves it, nor its locator finer than the pixels read."""
-        colour, blur = self.noise.colour, self.camera.blur_px
-        if colour is not None and blur < colour.blur_px:
-            raise ValueError(
-                f"camera.blur_px must be at least {colour.blur_px:.4g}, by which bilinear demosaicing blurs a picture "
-                f"of {colour.reads} itself, got {blur:g}"
-            )
-        if colour is not None and colour.interpolates and self.camera.blur_field is not None:
-            raise ValueError(
-                f"camera.blur_field must be left out with noise.colour.demosaicing = {colour.demosaicing}, got one"
-            )
-        if colour is not None and self.locator.scale_px < colour.least_scale_px:
-            raise ValueError(
-                f"locator.scale_px must be at least {colour.least_scale_px:g} where only {colour.reads} is read, from "
-                f"every second pixel of every second row, got {self.locator.scale_px:g}"
-            )
-
-    def _check_surroundings(self) -> None:
-        """Floor below the object."""
-        low = float(self.solid.vertices[:, 2].min())
-        if self.floor is not None and self.floor.height > low:
-            raise ValueError(
-                f"floor.height must be at most {low:g}, the object's lowest point, got {self.floor.height:g}"
-            )
 
 
 CAMERAS.followed_by(rebuild)
