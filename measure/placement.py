@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from imaging.boards.seen import NEEDED
 from imaging.light.appearance import is_plain
 from imaging.placed import combined, placed
 from measure.best import best_estimator
@@ -115,7 +116,7 @@ def adjusted(
             found = find(image[None], there if lit else there.unlit(), method)
             step = _step(found, picture)
             if not np.isfinite(step).all() or not _told(found).any():
-                return _nowhere(picture, status.NOT_VISIBLE, "nothing that tells it is found", explained)
+                return _nowhere(picture, status.NOT_VISIBLE, _why_untold(found), explained)
             before, here = here, combined(here, step)
             if _moved(found) < _SETTLED:
                 break
@@ -128,6 +129,14 @@ def _told(found: MeasuredFeatures) -> np.ndarray:
     """Which features of one image tell of the place, bool (q,)."""
     variances = np.diagonal(found.of_datums[0])
     return found.known.placing.datums & np.isfinite(variances) & np.isfinite(found.offsets[0])
+
+
+def _why_untold(found: MeasuredFeatures) -> str:
+    """Why nothing tells of the place."""
+    board = found.known.placing.board
+    if board is not None and not np.isfinite(board.noise[..., 0, 0]).any():
+        return NEEDED
+    return "nothing that tells it is found"
 
 
 def _step(found: MeasuredFeatures, picture: Picture) -> np.ndarray:

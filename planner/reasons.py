@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imaging.boards.seen import CLEAR
+from imaging.boards.seen import NEEDED
 from imaging.features.circles import LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE
 from imaging.models.bias import NEGLIGIBLE
@@ -131,7 +131,7 @@ def _unplaced(evaluated: Errors, m: int) -> str:
         return ""
     board = adjustment.placing.board
     if board is not None and not np.isfinite(board.noise[..., 0, 0]).any():
-        return f"no point of the board is found: it must be lit, in the picture, and {CLEAR:g} px beside the part there"
+        return NEEDED
     gradient, zone = known.gradient_object[m], known.quantities[m].tolerance
     most = allowed(float(np.sqrt(evaluated.variances_object[m])), 0.0 if zone is None else zone.half)
     tell = "tell" if board is None else "tells"

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from imaging.geometry.projection import project_ideal
 from imaging.placed import placed
 from scenes import Board, Picture, Scene
 from scenes.placement import of_board
@@ -51,8 +53,23 @@ def scene(folder: Any, name: str, kind: str = "chessboard", **changes: Any) -> S
 
 
 def place(picture: Picture, rng: np.random.Generator) -> np.ndarray:
-    """A place of the part at random, (6,); with a board such that all of it is in the picture."""
-    return parts.drawn(rng, parts.MOST * (1.0 if picture.scene.placement.board is None else _WHOLE))
+    """A place of the part at random, (6,); with a board such that all of it is in the picture, as far from the part
+    there as it has to be."""
+    if picture.scene.placement.board is None:
+        return parts.drawn(rng, parts.MOST)
+    while True:
+        there = parts.drawn(rng, parts.MOST * _WHOLE)
+        if is_clear(placed(picture, there)):
+            return there
+
+
+def is_clear(picture: Picture) -> bool:
+    """Whether one of the board's sides has all of the part more than 40 px beyond it, in the picture."""
+    camera, sensor = picture.scene.camera, np.array(list(picture.sensor))
+    corners, part = (project_ideal(each, sensor, camera) for each in (picture.scene.placement.board.outline,
+                                                                     picture.scene.solid.vertices))  # fmt: skip
+    hull = ConvexHull(corners).equations  # outward
+    return bool(((hull[:, :2] @ part.T + hull[:, 2:]) > 40.0).all(1).any())
 
 
 def drawn(picture: Picture, rng: np.random.Generator) -> Picture:

@@ -34,6 +34,7 @@ from scenes.placement import of_board, prior
 
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
 CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
+NEEDED = f"no point of the board is found: it must be lit, in the picture, and {CLEAR:g} px beside the part there"
 _UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
 _EXACT = 1e-16  # px^2: of points without noise and print
 _UNITS = np.repeat([1.0, np.pi / 180], 3)  # of a placement's components: the scene's unit, and degrees

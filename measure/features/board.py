@@ -198,8 +198,8 @@ class BoardTool:
     def found(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, str]:
         """Its parameters (k,), their covariance (k, k), and a status."""
         off, noise = self.points(self.measured(image))
-        gain, count = self.told.gain(noise), np.isfinite(noise[:, 0, 0]).sum()
-        if count < _FEWEST:
+        gain, seen = self.told.gain(noise), np.isfinite([noise[:, 0, 0], self.told.noise[:, 0, 0]])
+        if seen.sum(1).min() < _FEWEST:  # in the image, or as expected: then the parameters are none
             nothing = np.zeros(len(gain))
             return nothing, np.diag(nothing + np.inf), status.NOT_VISIBLE
         state = status.OK if self._fits(off, noise) >= WORST else status.MISFIT

@@ -14,7 +14,7 @@ from imaging.features.measurand import measurands
 from imaging.geometry.projection import camera_frame, sensor_position
 from imaging.models import variance_model
 from imaging.pictures import Pictures
-from imaging.placed import difference
+from imaging.placed import difference, placed
 from measure.boards.chessboard import measured as measured_corners
 from measure.boards.dots import measured as measured_dots
 from measure.features.board import BoardTool
@@ -299,3 +299,15 @@ def test_many_pictures_at_once_are_as_each_alone(block):
 
 def test_of_board_is_what_is_said_of_it(block):
     np.testing.assert_array_equal(of_board(block.scene.uncertainty), [0.003] * 3 + [0.005] * 3)
+
+
+def test_a_board_that_is_too_near_the_part_is_refused(folder):
+    """Its points are found, but taken to tell nothing there: once that had no errors, and the adjustment ran to and
+    fro, or settled six standard deviations away."""
+    scene = printed.scene(folder, "roof")
+    picture, there = Picture.of(scene, parts.SENSOR, parts.LIGHT), np.array([2.2, -0.4, 1.7, -2.8, -1.9, 2.3])
+    assert not printed.is_clear(placed(picture, there))
+    (image,) = render.expose(printed.seen(picture, there), scene.noise, np.random.default_rng(1), 1)
+    where = measure.locate(image, picture, estimator="gradient")
+    assert where.status == "not_visible"
+    assert "40 px beside the part" in where.reason
