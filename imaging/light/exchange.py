@@ -221,7 +221,9 @@ class Exchanged:
         direct = np.zeros(len(met.points))
         for k, emitter in enumerate(self.emitters):
             asked = met.rays % several == k
-            direct[asked] = several * _arriving(self.scene, emitter, met.points[asked], normals_at(solid, met.faces[asked], met.points[asked]))
+            direct[asked] = several * _arriving(
+                self.scene, emitter, met.points[asked], normals_at(solid, met.faces[asked], met.points[asked])
+            )
         sent = _white(self.scene, met.faces) * (direct + self.arriving[met.patches])
         return np.bincount(met.starts, sent, count) / rays
 

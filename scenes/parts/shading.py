@@ -39,7 +39,8 @@ def normals_at(solid: Solid, faces: np.ndarray | int, points: np.ndarray) -> np.
     if not facet.any():
         return found
     shape = np.broadcast_shapes(faces.shape, points.shape[:-1])
-    found, facet, faces = np.broadcast_to(found, (*shape, 3)).copy(), *(np.broadcast_to(v, shape) for v in (facet, faces))
+    found = np.broadcast_to(found, (*shape, 3)).copy()
+    facet, faces = np.broadcast_to(facet, shape), np.broadcast_to(faces, shape)
     found[facet] = _within(solid, faces[facet], np.broadcast_to(points, (*shape, 3))[facet])
     return found
 
@@ -48,48 +49,61 @@ def normals_at(solid: Solid, faces: np.ndarray | int, points: np.ndarray) -> np.
 def corner_normals(solid: Solid) -> np.ndarray:
     """Unit normals at the corners of the solid's triangles, shape (T, 3, 3)."""
     found = np.repeat(solid.normals[solid.triangle_faces][:, None], 3, 1)
-    if solid.plane.all():
-        return found
     facet = ~solid.plane[solid.triangle_faces]
-    points, number = np.unique(np.concatenate([solid.vertices, solid.triangles[facet].reshape(-1, 3)]), axis=0, return_inverse=True)
-    place, corner = np.split(number, [len(solid.vertices)])
-    surface, means = _means(solid, place, len(points))
+    if not facet.any():
+        return found
+    corners = np.concatenate([solid.vertices, solid.triangles[facet].reshape(-1, 3)])
+    places, number = np.unique(corners, axis=0, return_inverse=True)
+    of_vertex, of_corner = np.split(number, [len(solid.vertices)])
+    surface = _surfaces(solid)
+    means = _means(solid, surface, of_vertex, len(places))
     face = np.repeat(solid.triangle_faces[facet], 3)
-    made = means[surface[face] * len(points) + corner]
-    own = solid.normals[face]
-    found[facet] = np.where(((made * own).sum(1) >= _MOST)[:, None], made, own).reshape(-1, 3, 3)
+    own, mean = solid.normals[face], means[surface[face] * len(places) + of_corner]
+    alike = (mean * own).sum(1) >= _MOST
+    found[facet] = np.where(alike[:, None], mean, own).reshape(-1, 3, 3)
     for each in solid.curved:
         here = np.isin(solid.triangle_faces, each.faces)
         found[here] = each.surface.normals(solid.triangles[here])
     return found
 
 
-def _means(solid: Solid, place: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The surface of each face, (F,), and unit normals of each surface's corners, row surface x count + place; 0 elsewhere."""
+def _surfaces(solid: Solid) -> np.ndarray:
+    """Number of the curved surface that each facet is of, (F,): smooth edges join them."""
     smooth = np.array([edge.faces for edge in solid.edges if edge.kind == "smooth"], int).reshape(-1, 2)
-    surface = components(len(solid.faces), smooth[~solid.plane[smooth].any(1)])
-    many = np.array([len(loop) for loop in solid.faces])
-    face = np.repeat(np.arange(len(many)), many)
-    here = np.concatenate([np.array(loop) for loop in solid.faces])
-    ahead, back = (np.concatenate([np.roll(loop, step) for loop in solid.faces]) for step in (-1, 1))
-    one, two = (solid.vertices[v] - solid.vertices[here] for v in (ahead, back))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sine = np.linalg.norm(np.cross(one, two), axis=1)
-        weight = sine / ((one**2).sum(1) * (two**2).sum(1))
-        longest = np.maximum.reduceat(np.linalg.norm(one, axis=1), np.cumsum(many) - many)
-        unsure = SINGLE * np.abs(solid.vertices).max() * longest / solid.areas
-        weight = np.nan_to_num(weight / (1 + (unsure / _UNSURE) ** 2)[face])
+    return components(len(solid.faces), smooth[~solid.plane[smooth].any(1)])
+
+
+def _means(solid: Solid, surface: np.ndarray, place: np.ndarray, count: int) -> np.ndarray:
+    """Unit normals of surfaces at places, in the row surface x count + place, 0 where there is none.
+
+    ``place`` (V,) is that of each vertex, of so many.
+    """
+    face, here, weight = _weights(solid)
     facet = ~solid.plane[face]
-    means = np.zeros((count * (surface.max() + 1), 3))
-    np.add.at(means, (surface[face] * count + place[here])[facet], (weight[:, None] * solid.normals[face])[facet])
-    flat = np.zeros_like(means)
+    rows = (surface[face] * count + place[here])[facet]
+    found = np.zeros((count * (surface.max() + 1), 3))
+    np.add.at(found, rows, (weight[:, None] * solid.normals[face])[facet])
+    of_planes = np.zeros_like(found)
     for edge in solid.edges:
         if edge.kind == "smooth" and solid.plane[list(edge.faces)].sum() == 1:
-            plane, other = sorted(edge.faces, key=lambda f: not solid.plane[f])
-            flat[surface[other] * count + place[list(edge.ends)]] += solid.normals[plane]
-    means = np.where(flat.any(1)[:, None], flat, means)
-    size = np.linalg.norm(means, axis=1, keepdims=True)
-    return surface, means / np.where(size > 0, size, 1.0)
+            plane, facet = sorted(edge.faces, key=lambda each: not solid.plane[each])
+            of_planes[surface[facet] * count + place[list(edge.ends)]] += solid.normals[plane]
+    found = np.where(of_planes.any(1)[:, None], of_planes, found)
+    size = np.linalg.norm(found, axis=1, keepdims=True)
+    return found / np.where(size > 0, size, 1.0)
+
+
+def _weights(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each corner of each face's outline: the face, the vertex, and how much its normal counts there, (n,)."""
+    many = np.array([len(loop) for loop in solid.faces])
+    face, here = np.repeat(np.arange(len(many)), many), np.concatenate([np.array(loop) for loop in solid.faces])
+    ahead, back = (np.concatenate([np.roll(loop, step) for loop in solid.faces]) for step in (-1, 1))
+    one, two = (solid.vertices[other] - solid.vertices[here] for other in (ahead, back))
+    longest = np.maximum.reduceat(np.linalg.norm(one, axis=1), np.cumsum(many) - many)
+    unsure = SINGLE * np.abs(solid.vertices).max() * longest / solid.areas
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weight = np.linalg.norm(np.cross(one, two), axis=1) / ((one**2).sum(1) * (two**2).sum(1))
+    return face, here, np.nan_to_num(weight / (1 + (unsure / _UNSURE) ** 2)[face])
 
 
 def _within(solid: Solid, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
