@@ -21,6 +21,7 @@ from render.sight import Sight
 from render.texture import Face, bitmap, faces, shapes, texels, uneven_part
 from scenes import Brdf, Floor, Picture, Scene, Solid
 from scenes.lights.luminaire import BLACK
+from scenes.parts.shading import corner_normals
 
 _TINY_APERTURE = 1e-4  # of the distance: Mitsuba accepts it, and it changes nothing
 _BLOCK = 32  # fine pixels that share a stream of random numbers in scalar variants; else it depends on the processor
@@ -84,9 +85,9 @@ def textured(picture: Picture, active: frozenset[str]) -> tuple[tuple[Face, ...]
     """Each solid's surface with the paper's reflectance as textures; None where it has no such form (`render.texture`).
 
     Light between surfaces, and light or an aperture of some size need the reflectance for more than one
-    direction; curved surfaces have no plane to put a table on.
+    direction; curved surfaces, and facets of such, have no plane to put a table on.
     """
-    if active & MANY_WAYS or picture.scene.solid.curved:
+    if active & MANY_WAYS or not all(solid.plane.all() for solid in _solids(picture.scene, active)):
         return None
     found = []
     for solid in _solids(picture.scene, active):
@@ -127,10 +128,15 @@ def _shown(mitsuba, solid: Solid, part: Part) -> list[Any]:
 
 
 def _of_material(mitsuba, solid: Solid, here: np.ndarray, bsdf: dict) -> list[Any]:
-    """Faces ``here``, bool (F,): the plane ones as one mesh, curved ones as they are."""
-    flat = (here & ~stands_for(solid))[solid.triangle_faces]
-    plane = [mesh(mitsuba, solid.triangles[flat], bsdf)] if flat.any() else []
-    return plane + curved_shapes(mitsuba, solid, bsdf, here)
+    """Faces ``here``, bool (F,): the plane ones as one mesh, facets as another that is shaded as their surface, curved
+    ones as they are."""
+    left, made = here & ~stands_for(solid), []
+    for some, normals in ((left & solid.plane, None), (left & ~solid.plane, corner_normals)):
+        there = some[solid.triangle_faces]
+        if there.any():
+            shaded = None if normals is None else normals(solid)[there]
+            made.append(mesh(mitsuba, solid.triangles[there], bsdf, normals=shaded))
+    return made + curved_shapes(mitsuba, solid, bsdf, here)
 
 
 def _surface(mitsuba, picture: Picture, active: frozenset[str], material: Brdf, part: Face | None = None) -> dict:

@@ -24,6 +24,7 @@ from imaging.light.irradiance import bands, beam, electric_field, squared_distan
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
 from scenes import Brdf, Edge, Floor, Material, Scene, Solid
+from scenes.parts.shading import normals_at
 from scenes.viewpoint import Viewpoint
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -58,7 +59,7 @@ def is_separable(scene: Scene) -> bool:
     One convex body before darkness, diffuse, without print, under one point of light, through a lens that passes it
     evenly.
     """
-    plain = is_plain(scene) and not printed(scene) and not scene.camera.is_dimmed
+    plain = is_plain(scene) and scene.bodies.plane.all() and not printed(scene) and not scene.camera.is_dimmed
     return plain and scene.surfaces.is_diffuse and is_point(scene.lights)
 
 
@@ -125,12 +126,12 @@ def face_signal(
     faces : ndarray of int
         Indices, broadcast against the points without their last axis.
     normals : ndarray, optional
-        Unit normals where they are not those of the faces: of a round wall.
+        Unit normals where they are not those of the surfaces (`scenes.parts.shading`): of a round wall.
     prints : bool
         Whether faces show what is printed on them.
     """
     surfaces, faces = pictures.scene.surfaces, np.asarray(faces)
-    normals = pictures.scene.bodies.normals[faces] if normals is None else normals
+    normals = normals_at(pictures.scene.bodies, faces, points) if normals is None else normals
     kinds = surfaces.kinds[faces]
     first, *others = np.unique(kinds) if kinds.size else (0,)
 
@@ -157,7 +158,7 @@ def diffuse_signal(
     fall_off: bool = True,
 ) -> np.ndarray:
     """The diffuse part of the signal of points on a face, without its texture; parameters as of `signal`."""
-    matt, normal = pictures.scene.surfaces.of(face).matt(), pictures.scene.bodies.normals[face]
+    matt, normal = pictures.scene.surfaces.of(face).matt(), normals_at(pictures.scene.bodies, face, points)
     return signal(pictures, points, normal, axes, lit, material=matt, fall_off=fall_off)
 
 

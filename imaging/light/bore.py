@@ -27,6 +27,7 @@ _FINE = 5  # places in a patch, around, over which a form factor is averaged
 _FROM_WALL, _ROUGHLY = 256, 32  # rays; where the light is told roughly
 _NODES = 13  # depths at which the light is told
 _ALIKE = 1e-3  # of the radius: by how much the two rims of one wall may differ
+_SLANTED = 0.02  # sine of the angle between a facet of a wall and the axis
 _WITHIN = 1 - 1e-4  # of the radius of the widest free cylinder: where it is asked what reaches a facet
 
 
@@ -50,16 +51,27 @@ def bores(solid: Solid) -> tuple[Bore, ...]:
             length = -float(away @ rim.axis)
             aside = float(np.linalg.norm(away + length * rim.axis))
             unlike = max(aside, abs(rim.radius - other.radius)) > _ALIKE * rim.radius
-            if rim.hole and other.hole and length > 0 and not unlike and rim.axis @ other.axis < _ALIKE - 1:
+            facing = rim.hole and other.hole and length > 0 and rim.axis @ other.axis < _ALIKE - 1
+            if facing and not unlike and _is_wall(solid, rim, other):
                 found.append(_bore(solid, rim, length))
     return tuple(found)
 
 
+def _is_wall(solid: Solid, rim: Circle, other: Circle) -> bool:
+    """Whether the facets at both rims are of one surface along the axis: those of chamfers at either end are not."""
+    faces = sorted({*_beside(solid, rim), *_beside(solid, other)})
+    one = solid.regions is None or len(set(solid.regions[faces].tolist())) == 1
+    return one and float(np.abs(solid.normals[faces] @ rim.axis).max()) <= _SLANTED
+
+
+def _beside(solid: Solid, rim: Circle) -> tuple[int, ...]:
+    """The facets of a rim's wall that end at it."""
+    return tuple(sorted({face for name in rim.edges for face in solid.edge(name).faces} - {rim.face}))
+
+
 def _bore(solid: Solid, rim: Circle, length: float) -> Bore:
-    edges = [solid.edge(name) for name in rim.edges]
-    middles = solid.vertices[[edge.ends for edge in edges]].mean(1)
-    faces = {face for edge in edges for face in edge.faces} - {rim.face}
-    return Bore(rim, length, tuple(sorted(faces)), float(np.linalg.norm(middles - rim.centre, axis=1).min()))
+    middles = solid.vertices[[solid.edge(name).ends for name in rim.edges]].mean(1)
+    return Bore(rim, length, _beside(solid, rim), float(np.linalg.norm(middles - rim.centre, axis=1).min()))
 
 
 def light_in_bore(

@@ -27,6 +27,7 @@ from imaging.light.kept import kept
 from imaging.light.nodes import Frame, along, frame_of, goes_on, onto
 from imaging.light.places import Places, areas_of, in_unit_square, middles_of, of_sequence, ways_about
 from scenes import Floor, Scene, Solid
+from scenes.parts.shading import normals_at
 from scenes.parts.solid import assembled
 
 if TYPE_CHECKING:
@@ -220,7 +221,9 @@ class Exchanged:
         direct = np.zeros(len(met.points))
         for k, emitter in enumerate(self.emitters):
             asked = met.rays % several == k
-            direct[asked] = several * _arriving(self.scene, emitter, met.points[asked], solid.normals[met.faces[asked]])
+            direct[asked] = several * _arriving(
+                self.scene, emitter, met.points[asked], normals_at(solid, met.faces[asked], met.points[asked])
+            )
         sent = _white(self.scene, met.faces) * (direct + self.arriving[met.patches])
         return np.bincount(met.starts, sent, count) / rays
 
@@ -367,7 +370,8 @@ def exchanged(
     if exchange is None:
         return None
     places, white = exchange.places, _white(scene, exchange.places.faces)
-    direct = sum(_arriving(scene, each, places.points, places.normals) for each in emitters)
+    normals = normals_at(exchange.solid, places.faces, places.points)
+    direct = sum(_arriving(scene, each, places.points, normals) for each in emitters)
     lends = np.eye(exchange.tree.n) - exchange.means(white)[:, None] * exchange.between
     sent = np.linalg.solve(lends, exchange.means(white * direct))
     return Exchanged(scene, emitters, exchange, exchange.between @ sent)
@@ -386,7 +390,7 @@ def once_reflected(
     face, t = first_face(bodies, starts, ways, own)
     point, ray = np.nonzero(face >= 0)
     met, faces = starts[point, ray] + t[point, ray, None] * ways[point, ray], face[point, ray]
-    lit = sum(_arriving(scene, each, met, bodies.normals[faces]) for each in emitters)
+    lit = sum(_arriving(scene, each, met, normals_at(bodies, faces, met)) for each in emitters)
     return np.bincount(point, _white(scene, faces) * lit, len(points)) / _REFLECTED
 
 

@@ -154,7 +154,7 @@ def test_whether_a_way_leads_to_a_lamp(way, angle):
 @pytest.mark.parametrize("active", [(), ("interreflection",)])
 def test_surfaces_that_light_meets(active, task1, monkeypatch):
     """The first alone, or so many as the random numbers are made for, none ended by chance."""
-    monkeypatch.setattr(build, "mesh", lambda *args: None)
+    monkeypatch.setattr(build, "mesh", lambda *args, **named: None)
     crop = slice(0, 4), slice(0, 4)
     told = build.description(MITSUBA, Part(picture(task1), frozenset(active)), (8, 8), crop, 1)
     assert told["integrator"]["hide_emitters"]

@@ -10,7 +10,7 @@ import trimesh
 import scenes
 from imaging.light import exchange as exchange_module
 from imaging.light.between import _of_faces, _plain, light_between
-from imaging.light.bore import _form_factors
+from imaging.light.bore import _form_factors, bores
 from imaging.light.emitters import emitters
 from imaging.light.exchange import Hits, _arriving, _nodes, exchange_of, exchanged, room
 from imaging.light.nodes import _rim, frame_of, onto
@@ -34,6 +34,22 @@ def test_a_bore_sees_itself(deep):
     assert at_nodes[0].real.sum(1) == pytest.approx(1 - away[0] - away[1], rel=0.015)
     # margin: the order is said
     assert np.ptp(at_nodes[0].real.sum(1)) > 0.05 * at_nodes[0].real.sum(1).max()  # it is no constant
+
+
+def ring(chamfer: float):
+    """A ring of 10 mm with a bore of 2 mm radius, 5 mm deep, with chamfers at both ends."""
+    inside = [(2.0 + chamfer, 0.0), (2.0, chamfer), (2.0, 5.0 - chamfer), (2.0 + chamfer, 5.0)]
+    profile = np.array([(10.0, 0.0), (10.0, 5.0), *reversed(inside[:: 3 if not chamfer else 1]), (10.0, 0.0)])
+    return mesh_solid(trimesh.creation.revolve(profile, sections=96))
+
+
+def test_chamfers_are_no_wall_of_a_bore():
+    """Their rims face each other and are as wide as each other; the closed form is of a cylinder from rim to rim."""
+    (bore,) = bores(ring(0.0))
+    assert (bore.rim.radius, bore.length, len(bore.faces)) == (pytest.approx(2.0), pytest.approx(5.0), 96)
+    chamfered = ring(0.5)
+    assert sum(circle.hole for circle in chamfered.circles) == 2
+    assert bores(chamfered) == ()
 
 
 _RAYS = 16384
