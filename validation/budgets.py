@@ -63,11 +63,10 @@ def formulas_do(picture: Picture, statuses: tuple[str, ...]) -> bool:
 
 
 def simulated(picture: Picture) -> Correction:
-    """The correction of a picture by its best estimator, kept on disk."""
-    from validation import kept
-    from validation.remeasured import Method
+    """The correction of a picture by the estimator that tells most of it, kept on disk."""
+    from validation import kept, simulation
 
-    return kept.correction(picture, Method(best_estimator(picture)))
+    return simulation.best(picture, kept.correction)
 
 
 def monte_carlo(found: SceneBudget, seed: int, digits: int = 2, margin: float = 5.0) -> list[dict[str, Any]]:

@@ -37,7 +37,7 @@ from render.build import MANY_WAYS
 from render.large import LARGE, LARGE_RANDOM, near_required
 from scenes import Picture, Pose, Scene
 from scenes.materials import Brdf
-from scenes.status import CLUTTER, MISFIT, OK
+from scenes.status import CLUTTER, ILL_CONDITIONED, MISFIT, OK, is_trusted
 from validation.dimmed import of_one_surface
 from validation.remeasured import Method
 
@@ -46,6 +46,7 @@ _BETWEEN = "interreflection"
 _PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
 _ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
+_OTHERWISE = "isophote"  # where the default estimator does not tell which of two edges it is on
 _SETS = 4  # of rays that tell what changes a bias that is not known well enough
 _NOISY = 8  # pictures in which a texture is looked for
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
@@ -223,6 +224,23 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     most.
     """
     return _simulated(picture, method, how.by(method))
+
+
+def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simulated) -> Correction:
+    """The correction of a picture by its default estimator; by isophotes where these tell values that it does not.
+
+    Where two edges run together noise may decide which of them an edge point is on by one rule, and not by another:
+    that a simulated picture tells, without an image. What ``made`` makes is a correction by one method.
+    """
+    found = made(picture, Method(measure.best_estimator(picture)))
+    if ILL_CONDITIONED not in found.simulated:
+        return found
+    other = made(picture, Method(_OTHERWISE))
+    return other if _trusted(other) > _trusted(found) else found
+
+
+def _trusted(found: Correction) -> int:
+    return sum(map(is_trusted, found.status))
 
 
 @lru_cache(maxsize=64)

@@ -4,8 +4,8 @@ Camera and lights stand 10 to 50 degrees off the vertical, anywhere around; ligh
 stand where they do. Before a light that faces it the camera stands up to twice as far off as in the scene's settings:
 the light has to be behind the part. Measured is a value where a prediction without an image says that it can be,
 whatever its bias (not where it says that a board beside the part is hidden: `unplaced`); then its bias is simulated and
-taken off, as `ice measure` does, by the picture's default estimator, and it is counted whether it is `ok`. At least 90
-% have to be.
+taken off, as `ice measure` does, by the estimator that it takes (`validation.simulation.best`), and it is counted
+whether it is `ok`. At least 90 % have to be.
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ from typing import Annotated
 import numpy as np
 import typer
 
-import measure
 import planner
 import scenes
 from imaging.light.backlight import backlights
 from scenes import Picture, Pose, Scene
 from scenes.status import CLUTTER, OK, is_trusted
 from validation import simulation
-from validation.remeasured import Method
 
 LEAST = 0.9
 _TRIES = 200
@@ -53,7 +51,7 @@ def states(scene: Scene, poses: int, seed: int) -> list[str]:
         picture = placed(scene, rng)
         some = measurable(picture)
         if some.any():
-            found.append(np.array(simulation.simulated(picture, Method(measure.best_estimator(picture))).status)[some])
+            found.append(np.array(simulation.best(picture).status)[some])
         if len(found) == poses:
             break
     return np.concatenate(found).tolist() if found else []

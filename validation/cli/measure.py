@@ -14,7 +14,7 @@ import scenes.photograph
 from scenes import InvalidInput
 from scenes.files.image import Size
 from scenes.photograph import Photograph
-from scenes.status import is_trusted, legend
+from scenes.status import ILL_CONDITIONED, is_trusted, legend
 from validation.cli import measurands, photograph, placement, recorded, together
 from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say, taking
 from validation.cli.outputs import check_directory, check_file
@@ -241,12 +241,15 @@ def _corrected(
 
     method = Method(estimator or measure.best_estimator(picture), threshold)
     plain = measure.measure(image, picture, estimator=method.locator, threshold=threshold)
-    if not np.isfinite(plain.value).any():
+    if not (np.isfinite(plain.value).any() or (estimator is None and (plain.status == ILL_CONDITIONED).any())):
         return plain
-    from validation import kept
+    from validation import kept, simulation
 
     with progress("simulating the picture for its bias", "renders", at_once=True):
-        return measure.corrected(plain, kept.correction(picture, method), image)
+        off = kept.correction(picture, method) if estimator else simulation.best(picture, kept.correction)
+    if off.estimator != method.locator:
+        plain = measure.measure(image, picture, estimator=off.estimator, threshold=threshold)
+    return measure.corrected(plain, off, image)
 
 
 def _shapes_wanted(given: Options) -> dict[str, Any]:
