@@ -101,15 +101,24 @@ class Bundle:
         """Derivatives (q, n) of each picture's lines and circles by the unknowns."""
         return tuple(_design(self.unknowns, seen, k) for k, seen in enumerate(self.seen, 1))
 
-    def adjusted(self, errors: Sequence[np.ndarray], counts: Sequence[np.ndarray] | None = None) -> BundleAdjustment:
+    def adjusted(
+        self,
+        errors: Sequence[np.ndarray],
+        counts: Sequence[np.ndarray] | None = None,
+        doubts: Sequence[np.ndarray] | None = None,
+    ) -> BundleAdjustment:
         """The adjustment of lines and circles whose noise has covariances (q, q), infinite on the diagonal of those
-        that are not found; of those alone that count, bool (q,), where that is said."""
+        that are not found; of those alone that count, bool (q,), where that is said.
+
+        They are weighed by that and the covariances (q, q) of their biases' correction, ``doubts``.
+        """
         whites, told = [], []
         for k, (design, covariance) in enumerate(zip(self.designs, errors, strict=True)):
             some = np.isfinite(np.diag(covariance)) & np.isfinite(design).all(1)
             some = some if counts is None else some & counts[k]
             told.append(np.where(some[:, None] & some, covariance, 0.0))
-            whites.append(whitening(told[-1]))
+            beside = 0.0 if doubts is None else np.where(some[:, None] & some, doubts[k], 0.0)
+            whites.append(whitening(told[-1] + beside))
         return BundleAdjustment(self, tuple(whites), tuple(told))
 
     def expected(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -138,7 +147,8 @@ class BundleAdjustment:
     ----------
     bundle : Bundle
     whites : tuple of ndarray, shape (q, q)
-        Combinations of each picture's lines and circles of variance 1; rows of zeros of those that do not count.
+        Combinations of each picture's lines and circles of variance 1, by noise and what is not sure of their biases;
+        rows of zeros of those that do not count.
     errors : tuple of ndarray, shape (q, q)
         Their covariances by noise; 0 of those that do not count.
     """
