@@ -26,6 +26,7 @@ from scenes.cameras.covariance import ORDER
 
 _ADJUSTED = ("part_shift", "part_tilt_deg", "principal_point_px")
 _OF_SENSORS = ("sensor_deg", "sensor_roll_deg", "sensor_distance")
+_OF_CARRIERS = ("hand_eye", "stage", "turntable")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,8 @@ def bundle_budget(
 ) -> BundleBudget:
     """The uncertainty of every measurand of pictures adjusted together; one budget a measurand.
 
-    Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``camera`` and ``datums``; a sensor that
+    Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``carrier`` (errors of hand_eye, stage and
+    turntable that pictures share), ``carrier 1``, ... (each picture's own), ``camera`` and ``datums``; a sensor that
     counts as known has those of its pose, with its number. Where biases are taken off, what that is not sure of
     (``bias by ...``) stands in place of the model error.
 
@@ -116,17 +118,19 @@ def budgets_of(
 def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[Source, ...], np.ndarray]:
     """What moves places in the images beside what is adjusted, and the values' derivatives by it, (M, n)."""
     found: dict[str, tuple[Source, np.ndarray]] = {}
+    own = {e.name for each in told.pictures for c in each.scene.uncertainty.carriers for e in c.errors if e.own}
     for k, (picture, pull) in enumerate(zip(told.pictures, told.preferred.by_features, strict=True)):
         features = Features(Pictures.of(picture))
         here = Station.nominal(features.pictures)
         for each in sources(picture.scene):
             of_sensor = each.name.startswith(_OF_SENSORS)
             adjusted = each.name.startswith(_ADJUSTED) or each.name in ORDER or (of_sensor and sensors[k] != "known")
-            if each.kind != "geometry" or adjusted:
+            carried = each.name.startswith(_OF_CARRIERS) and "uncertain" in sensors
+            if each.kind != "geometry" or adjusted or carried:
                 continue
             step = STEP * each.scale
             ahead, behind = features.errors([each.moved(here, step), each.moved(here, -step)])
-            name = f"{each.name} {k + 1}" if of_sensor else each.name
+            name = f"{each.name} {k + 1}" if of_sensor or each.name in own else each.name
             slope = pulled(pull, ((ahead - behind) / (2 * step))[None])[0]
             found[name] = replace(each, name=name), found[name][1] + slope if name in found else slope
     count = len(told.quantities)
@@ -158,5 +162,5 @@ def _terms(told: BundlePrediction) -> list[list[Term]]:
 
 
 def _is_place(name: str) -> bool:
-    """Whether a block is the part's place, a sensor's or a camera's numbers, not a datum."""
-    return name == "part" or name.startswith(("sensor ", "camera"))
+    """Whether a block is the part's place, a sensor's, a carrier's or a camera's numbers, not a datum."""
+    return name == "part" or name.startswith(("sensor ", "camera", "carrier"))
