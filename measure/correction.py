@@ -132,10 +132,6 @@ def _of_features(
         return None
     off, renders = found.offsets, len(images.renders)
     steps, noise = off[alike:-1] - off[0], told.of_features
-    scatter = by_features(found, alike) ** 2 / renders if alike > 1 else np.inf
-    of_rays = (
-        scatter * np.where(np.isfinite(noise), noise, 0.0) if np.isfinite(scatter) else np.full_like(noise, np.inf)
-    )
     lost = found.seen.features_of(~np.isfinite(np.diag(noise)))
     states = zip(found.states(-1), np.where(lost, status.ILL_CONDITIONED, status.OK), strict=True)
     least, most = limits
@@ -143,11 +139,25 @@ def _of_features(
         bias=off[:renders].mean(0),
         moved={name: steps[[each == name for each in names]] for name in dict.fromkeys(names)}
         | dict(images.of_features),
-        rendering=of_rays,
+        rendering=_by_rays(off[:alike], noise, by_features(found, alike) if alike > 1 else np.inf) / renders,
         errors=noise,
         states=tuple(status.worst(*map(str, both)) for both in states),
         saturated=(float(least.max()), float(most.min())),
     )
+
+
+def _by_rays(off: np.ndarray, noise: np.ndarray, pooled: float) -> np.ndarray:
+    """Covariance (q, q) by the noise of one render, of lines and circles found in some (n, q).
+
+    As pixel noise has it, scaled to what all of them together tell, ``pooled`` in its standard deviations, and where
+    one scatters more, to that.
+    """
+    if not np.isfinite(pooled):
+        return np.full_like(noise, np.inf)
+    known = np.where(np.isfinite(noise), noise, 0.0)
+    own, sigma = np.nan_to_num(off.std(0, ddof=1)), np.sqrt(np.diag(known))
+    part = np.fmax(np.divide(own, sigma, out=np.zeros_like(own), where=sigma > 0), pooled)
+    return part[:, None] * known * part
 
 
 def _adjusted(images: Images, picture: Picture, names: tuple[str, ...], moved: list[np.ndarray]) -> Adjusted | None:

@@ -41,7 +41,8 @@ from validation.remeasured import Method
 LIGHT, SENSORS = (22.0, 60.0), ((28.0, 300.0), (30.0, 60.0), (25.0, 200.0))
 STATION = ((20, 0), (20, 225)), ((20, 120), (20, 315)), ((20, 240), (20, 45))
 CONFIDENCE, BIAS = 0.99, 0.3
-OTHERS = 1000  # where the seeds begin of renders that are measured
+PITCH_UM = 3.45  # of the station's camera
+OTHERS, RENDERS = 1000, 6  # where the seeds begin of renders whose mean is measured, and how many they are
 _CHANCE = 3.3  # standard deviations: 0.1 %
 _KNOWN = {"from": "known", "datums": [], "datum_sd": None}
 
@@ -53,7 +54,8 @@ class Row:
     label: str
     pulls: np.ndarray
     doubt: float = 0.0
-    """u(bias) over sigma, of a correction."""
+    rays: float = 0.0
+    """u(bias) over sigma, of a correction; and what rays leave of renders that are corrected."""
 
     @property
     def ratio(self) -> float:
@@ -84,11 +86,15 @@ def is_one(rows: list[Row], factor: float = 1.0) -> bool:
 
 
 def centred(rows: list[Row]) -> list[bool]:
-    """Whether means are within `BIAS` combined standard uncertainties, of noise and correction, and chance."""
+    """Whether means are within `BIAS` combined standard uncertainties, of noise and correction, beyond chance and what
+    rays leave."""
     tail = (1 - CONFIDENCE ** (1 / len(rows))) / 2
     chance = -norm.ppf(tail)
     return [
-        bool(abs(row.pulls.mean()) < BIAS * np.hypot(1, row.doubt) + chance / np.sqrt(len(row.pulls))) for row in rows
+        bool(
+            abs(row.pulls.mean()) < BIAS * np.hypot(1, row.doubt) + chance * np.hypot(row.rays, len(row.pulls) ** -0.5)
+        )
+        for row in rows
     ]
 
 
@@ -100,6 +106,7 @@ def of_noise(
     draws: int,
     seed: int,
     corrections: list[measure.Correction] | None = None,
+    renders: int = 1,
 ) -> list[Row]:
     """Pulls of the trusted values of noisy images, by what noise alone does."""
     rng, found = np.random.default_rng(seed), []
@@ -119,7 +126,10 @@ def of_noise(
         if good[:, m].mean() > 0.95:
             some = good[:, m]
             doubt = float(np.nan_to_num(doubts[some, m] / told_by[some, m]).mean())
-            rows.append(Row(f"{label} {name}", (values[some, m] - told.nominal[m]) / told_by[some, m], doubt))
+            rays = 0.0 if corrections is None else told.doubts["rendering"][m] / told.sigma[0, m]
+            rays *= np.sqrt(1 + min(each.renders for each in corrections or ()) / renders) if rays else 1.0
+            pulls = (values[some, m] - told.nominal[m]) / told_by[some, m]
+            rows.append(Row(f"{label} {name}", pulls, doubt, float(rays)))
     return rows
 
 
@@ -195,7 +205,7 @@ def report(rows: list[Row]) -> bool:
     if not rows:
         return False
     for row, held, mid in zip(rows, inside(rows), centred(rows), strict=True):
-        mean = f"mean {row.pulls.mean():+.3f} sigma, u(bias) {row.doubt:.2f} sigma"
+        mean = f"mean {row.pulls.mean():+.3f} sigma, u(bias) {row.doubt:.2f}, rays {row.rays:.2f}"
         told = f"measured / told {row.ratio:.3f}, {mean}, {len(row.pulls)} sets"
         print(f"{row.label:40} {told}{'' if held else '  OUTSIDE CHANCE'}{'' if mid else '  OFF'}")
     print(f"all {len(rows)} rows: measured / told {pooled(rows):.3f}")
@@ -216,17 +226,19 @@ def of_part(scene: Scene, draws: int, sets: int, seed: int) -> tuple[list[Row], 
     return rows, wrong, controls(tri, draws, seed)
 
 
-def of_station(draws: int, seed: int) -> tuple[list[Row], list[Row]]:
+def of_station(draws: int, seed: int, smaller: int = 1) -> tuple[list[Row], list[Row]]:
     """Rows of the rendered station, biases taken off, and those of three known sensors with biases left on."""
     made = station()
+    if smaller > 1:
+        made = made.with_(camera={"pixel_pitch_um": smaller * PITCH_UM})
     tri, rows = [Picture.of(made, sensor, light) for sensor, light in STATION], []
-    clean = [render.image(each, quality=Quality(seed=OTHERS)) for each in tri]
+    clean = [np.mean([render.image(each, quality=Quality(seed=OTHERS + k)) for k in range(RENDERS)], 0) for each in tri]
     told = [kept.correction(each, Method(measure.best_estimator(each))) for each in tri]
     left = of_noise("station, 3 known, biased", clean, tri, "known", draws, seed)
     for count in (2, 3):
         for sensors in ("known", "uncertain"):
             label = f"station, {count} {sensors}"
-            rows += of_noise(label, clean[:count], tri[:count], sensors, draws, seed, told[:count])
+            rows += of_noise(label, clean[:count], tri[:count], sensors, draws, seed, told[:count], RENDERS)
     return rows, left
 
 
@@ -234,6 +246,7 @@ def bundles(
     draws: Annotated[int, typer.Option(help="Noisy sets of each row.")] = 200,
     sets: Annotated[int, typer.Option(help="Sets of sensors that are drawn anew.")] = 100,
     seed: Annotated[int, typer.Option()] = 1,
+    smaller: Annotated[int, typer.Option(help="By what the station's pictures are smaller, each way.")] = 1,
     only: Annotated[str, typer.Option(help="exact: two parts in exact images; station: bracket_station.")] = "",
 ) -> None:
     """Two and three pictures adjusted together: values scatter as told; exact 40 minutes, station 30."""
@@ -245,7 +258,7 @@ def bundles(
                 found = of_part(scene, draws, sets, seed)
                 rows, wrong, passed = rows + found[0], wrong + found[1], passed + found[2]
     if only != "exact":
-        told, left = of_station(draws, seed)
+        told, left = of_station(draws, seed, smaller)
         rows += told
         if all(centred(left)):
             passed.append("station's biases")
