@@ -10,6 +10,7 @@ from measure.boards.charuco import charuco
 from measure.boards.chessboard import Board, chessboard
 from measure.boards.dots import dot_grid
 from measure.boards.marker_grid import marker_grid
+from measure.boards.next_pose import NextBoard, next_board
 from measure.bounds import bound
 from measure.bundle import Bundled, bundle
 from measure.correction import Images, correction
@@ -55,6 +56,7 @@ __all__ = [
     "MeasuredValue",
     "Measurement",
     "Measurements",
+    "NextBoard",
     "NoiseCurve",
     "PhotonTransfer",
     "Propagated",
@@ -85,6 +87,7 @@ __all__ = [
     "measure_by",
     "measure_quadrilateral",
     "mtf",
+    "next_board",
     "noise_curve",
     "photograph",
     "photon_transfer",

@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
+from imaging.bundles.biases import FeatureBias, corrected, covariances
 from imaging.bundles.bundle import Bundle
 from imaging.bundles.preferred import Preferred
 from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
 from measure.best import best_estimator
-from measure.covariances import of_measured
+from measure.covariances import of_measured, scaled
 from measure.goodness import WORST
-from measure.measurement import checked_image
+from measure.known_bias import Correction
+from measure.measurement import check_same, checked_image
 from measure.quantities import MeasuredFeatures, find
+from measure.saturation import saturated
 from scenes import InvalidInput, Picture, Quantity, status
 from scenes.results import Shown, finite, value
 
@@ -47,11 +50,18 @@ class Bundled(Shown):
     status : ndarray of str, shape (..., M)
         ``ok``; ``clutter`` where it needs lines or circles that are biased; ``misfit`` where the pictures do not fit
         each other (chi-square of what is ``ok``, p < 1e-4); ``unplaced`` where they leave it open; else what its
-        features lack.
+        features lack. Where biases are taken off, `scenes.status.corrected` decides.
+    bias, u_bias : ndarray, shape (..., M)
+        What corrections have taken off the values, to first order, and its standard uncertainty (not variance); 0 and
+        NaN where none were given; infinite where a bias is not known.
     p_value : ndarray, shape (...)
         Of the chi-square; 1 where nothing is seen twice.
     reason : tuple of str
         Of each quantity in the first set, why it is not told; empty where it is.
+    preferred : Preferred
+        The adjustments of the first set, with the values' derivatives by lines and circles of each picture.
+    doubts : dict of str to ndarray, shape (M,), or None
+        What `u_bias` of the first set is made of, by source; None without corrections.
     pictures : tuple of Picture
         As the first set shows them: with part and sensors where they were found, to a few hundredths of a px.
     places : ndarray, shape (..., P, 3)
@@ -68,8 +78,12 @@ class Bundled(Shown):
     u_placed: np.ndarray
     known_before: dict[str, np.ndarray]
     status: np.ndarray
+    bias: np.ndarray
+    u_bias: np.ndarray
     p_value: np.ndarray
     reason: tuple[str, ...]
+    preferred: Preferred
+    doubts: dict[str, np.ndarray] | None
     pictures: tuple[Picture, ...]
     places: np.ndarray
     points: tuple[str, ...]
@@ -85,21 +99,22 @@ class Bundled(Shown):
 
     @property
     def u(self) -> np.ndarray:
-        """Of noise and of what is not known before together, shape (..., M)."""
-        return np.hypot(self.sigma, self.u_placed)
+        """Of noise, of what is not known before, and of the biases' correction where there is one, shape (..., M)."""
+        return np.sqrt(self.sigma**2 + self.u_placed**2 + np.nan_to_num(self.u_bias, posinf=np.inf) ** 2)
 
     def as_rows(self) -> list[dict[str, Any]]:
-        """One record a set and measurand: value, sigma, u, status; None: there is none."""
+        """One record a set and measurand: value, sigma, u_bias, u, status; None: there is none."""
         count = len(self.quantities)
-        columns = (each.reshape(-1, count) for each in (self.value, self.sigma, self.u_placed, self.u, self.status))
+        told = self.value, self.sigma, self.u_placed, self.u_bias, self.u, self.status
+        columns = (each.reshape(-1, count) for each in told)
         return [
             {
                 "scene": self.pictures[0].scene.name, "pictures": len(self.pictures), "image": i, "name": each.name,
                 "kind": each.kind, "unit": self.units[m], "value": finite(values[m]), "sigma": finite(sigmas[m]),
-                "u_placed": finite(before[m]), "u": finite(both[m]), "nominal": float(self.nominal[m]),
-                "status": str(states[m]),
+                "u_placed": finite(before[m]), "u_bias": finite(doubt[m]), "u": finite(both[m]),
+                "nominal": float(self.nominal[m]), "status": str(states[m]),
             }
-            for i, (values, sigmas, before, both, states) in enumerate(zip(*columns, strict=True))
+            for i, (values, sigmas, before, doubt, both, states) in enumerate(zip(*columns, strict=True))
             for m, each in enumerate(self.quantities)
         ]  # fmt: skip
 
@@ -120,6 +135,7 @@ def bundle(
     axes: Axes = "known",
     cameras: Cameras = "one",
     estimator: str | None = None,
+    corrections: Sequence[Correction] | None = None,
 ) -> Bundled:
     """Measure several pictures of one part together (bundle adjustment), its own features the ties.
 
@@ -132,6 +148,8 @@ def bundle(
         What is not known before (`imaging.bundles.unknowns.Freedom`).
     estimator : str, optional
         As for `measure.measure`.
+    corrections : sequence of Correction, optional
+        Of each picture, whose lines' and circles' biases are taken off (`imaging.bundles.biases`); by its estimator.
 
     Raises
     ------
@@ -142,7 +160,8 @@ def bundle(
     -----
     The part's place counts as known to ``uncertainty.part_shift`` and ``part_tilt_deg``, datums on it to
     ``placement.datum_sd``. Part and sensors are expected anew, and looked for again, until that moves nothing by more
-    than 0.02 px; of stacks where the mean of all images puts them.
+    than 0.02 px; of stacks where the mean of all images puts them. Biases are those of the pictures that are given:
+    beside them, as far as sensors and part are moved, they count as the same.
 
     Examples
     --------
@@ -156,10 +175,14 @@ def bundle(
     freedom = Freedom(sensors, shape, axes, cameras)
     stacks, pictures, lead = _checked(shots)
     expected = Bundle.of(pictures, freedom)
-    names = [estimator or best_estimator(picture) for picture in pictures]
+    known = [
+        _Known.of_picture(*one, estimator) for one in zip(stacks, pictures, _each(corrections, pictures), strict=True)
+    ]
     for _ in range(_STEPS):
-        found = [find(*one) for one in zip(stacks, expected.pictures, names, strict=True)]
-        every = [_One.of(expected, found, i) for i in range(len(stacks[0]))]
+        found = [
+            find(stack, there, *one.method) for stack, there, one in zip(stacks, expected.pictures, known, strict=True)
+        ]
+        every = [_One.of(expected, found, known, i) for i in range(len(stacks[0]))]
         numbers = np.mean([one.numbers for one in every], 0)
         if not np.isfinite(numbers).all() or expected.reach(numbers) < _SETTLED:
             break
@@ -167,21 +190,80 @@ def bundle(
     return _gathered(expected, every, lead)
 
 
+def _each(corrections: Sequence[Correction] | None, pictures: list[Picture]) -> Sequence[Correction | None]:
+    if corrections is None:
+        return [None] * len(pictures)
+    if len(corrections) != len(pictures):
+        raise InvalidInput(f"corrections must be one for each of {len(pictures)} pictures, got {len(corrections)}")
+    return corrections
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """How one picture's images are measured, and what is known of its lines' and circles' biases.
+
+    Attributes
+    ----------
+    method : (str, float or None)
+        Estimator, and threshold of ``canny``.
+    is_corrected : bool
+    bias : FeatureBias or None
+        None where it is not known.
+    of : ndarray of bool, shape (n,)
+        Of which images it is: as many pixels at the end of the scale as it allows.
+    """
+
+    method: tuple[str, float | None]
+    is_corrected: bool
+    bias: FeatureBias | None
+    of: np.ndarray
+
+    @classmethod
+    def of_picture(
+        cls, images: np.ndarray, picture: Picture, correction: Correction | None, estimator: str | None
+    ) -> _Known:
+        if correction is None:
+            return cls((estimator or best_estimator(picture), None), False, None, np.ones(len(images), bool))
+        check_same(correction, picture, estimator, None)
+        told, name = correction.features, correction.estimator
+        cut, (least, most) = saturated(images, picture, name), (0.0, np.inf) if told is None else told.saturated
+        return cls((name, correction.threshold), True, told, (cut >= least) & (cut <= most))
+
+    def taken(self, found: MeasuredFeatures, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, FeatureBias | None]:
+        """Of the i-th image how far off lines and circles are (q,), their covariance by noise (q, q), statuses
+        (E + C,) and biases."""
+        off, errors, states = found.offsets[i], found.of_datums[i], found.states(i)
+        if not self.is_corrected:
+            return off, errors, states, None
+        if self.bias is None or not self.of[i]:
+            return off, errors, np.where(states == status.OK, status.CLUTTER, states), None
+        known, seen = self.bias.is_known, found.known.seen
+        doubtful = seen.of_features(np.isin(states, (status.CLUTTER, status.MISFIT)))
+        states = self.bias.states_of(states, ~seen.features_of(~known))
+        errors = scaled(errors, np.where(np.eye(len(known), dtype=bool), self.bias.errors, 0.0), doubtful & known)
+        return off - np.where(known, self.bias.bias, 0.0), errors, states, self.bias
+
+
 @dataclass(frozen=True, eq=False)
 class _One:
-    """One set of images: its adjustment, the unknowns (n,), values (M,), p-value and statuses (M,)."""
+    """One set of images: its adjustment, the unknowns (n,), values (M,), biases and their standard uncertainties (M,),
+    p-value and statuses (M,)."""
 
     chosen: Preferred
     numbers: np.ndarray
     value: np.ndarray
+    bias: np.ndarray
+    u_bias: np.ndarray
+    doubts: dict[str, np.ndarray] | None
     p_value: float
     status: tuple[str, ...]
 
     @classmethod
-    def of(cls, expected: Bundle, found: list[MeasuredFeatures], i: int) -> _One:
-        states = [_states(each, i) for each in found]
-        errors, off = [each.of_datums[i] for each in found], [each.offsets[i] for each in found]
-        chosen = Preferred.of(expected, errors, states)
+    def of(cls, expected: Bundle, found: list[MeasuredFeatures], known: list[_Known], i: int) -> _One:
+        off, errors, states, biases = zip(
+            *(one.taken(each, i) for one, each in zip(known, found, strict=True)), strict=True
+        )
+        chosen = Preferred.of(expected, errors, states, covariances(biases, errors))
         numbers, squares = chosen.good.solved(off)
         value, freedom = expected.values(numbers), chosen.good.told.freedom
         if not chosen.by_good.all():
@@ -192,16 +274,16 @@ class _One:
         p_value = float(chdtrc(freedom, squares)) if freedom > 0 else 1.0
         fits = status.OK if p_value >= WORST else status.MISFIT
         told = tuple(status.worst(each, fits) for each in chosen.statuses(states))
-        return cls(chosen, numbers, np.where(np.isin(told, _VALUED), value, np.nan), p_value, told)
+        bias, u_bias, doubts = np.zeros(len(value)), np.full(len(value), np.nan), None
+        if any(one.is_corrected for one in known):
+            (bias, u_bias), doubts = chosen.biased(biases), chosen.doubts(biases)
+            told = corrected(told, u_bias, np.sqrt(np.diag(chosen.covariance)), expected.quantities)
+        return cls(
+            chosen, numbers, np.where(np.isin(told, _VALUED), value, np.nan), bias, u_bias, doubts, p_value, told
+        )
 
 
 _VALUED = tuple(each for each in status.MEASURED if each != status.UNPLACED)
-
-
-def _states(found: MeasuredFeatures, i: int) -> np.ndarray:
-    """Status of each edge and circle in the i-th image, (E + C,)."""
-    edges = [status.worst(str(one), str(found.shape.whole[i])) for one in found.shape.counted[i]]
-    return np.array([*edges, *(str(circle.state[i]) for circle in found.circles)])
 
 
 def _checked(shots: Sequence[tuple[np.ndarray, Picture]]) -> tuple[list[np.ndarray], list[Picture], tuple[int, ...]]:
@@ -236,8 +318,12 @@ def _gathered(expected: Bundle, every: list[_One], lead: tuple[int, ...]) -> Bun
         u_placed=np.array([one.chosen.u_placed for one in every]).reshape(*lead, count),
         known_before={name: np.array([one[name] for one in before]).reshape(*lead, count) for name in before[0]},
         status=np.array([one.status for one in every]).reshape(*lead, count),
+        bias=np.array([one.bias for one in every]).reshape(*lead, count),
+        u_bias=np.array([one.u_bias for one in every]).reshape(*lead, count),
         p_value=np.array([one.p_value for one in every]).reshape(lead),
         reason=every[0].chosen.reasons,
+        preferred=every[0].chosen,
+        doubts=every[0].doubts,
         pictures=expected.pictures,
         places=np.array([expected.at(one.numbers).aligned().laid() for one in every]).reshape(*lead, -1, 3),
         points=(*(expected.unknowns.vertex(i) for i in expected.unknowns.vertices), *expected.unknowns.circles),

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from imaging.bundles.biases import FeatureBias
 from imaging.colour import seen
 from imaging.features.measurand import measurands
 from imaging.pictures import Pictures
@@ -24,7 +25,7 @@ from measure.propagation import PropagatedValues, propagate
 from measure.quantities import MeasuredFeatures, find
 from measure.render_noise import by_features, by_pixels
 from measure.saturation import limits
-from scenes import InvalidInput, Picture
+from scenes import InvalidInput, Picture, status
 from scenes.status import MEASURED
 
 Pair = tuple[np.ndarray, np.ndarray]
@@ -44,6 +45,8 @@ class Images:
         Renders of other rays that say how large the renderer's noise is, and nothing of the bias.
     known : dict of str to pair of ndarray, shape (M,)
         Standard uncertainties of sources that need no image, in the object and in the image.
+    of_features : dict of str to ndarray, shape (k, q)
+        What one standard uncertainty of each input of such a source moves lines and circles by.
     by_pixel : bool
         Whether rays are random pixel by pixel, so that two renders' pixels tell how noisy they are.
     overall : ndarray, shape (2, 2 + k, height, width), or None
@@ -55,6 +58,7 @@ class Images:
     changed: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
     beside: tuple[np.ndarray, ...] = ()
     known: Mapping[str, Pair] = field(default_factory=dict)
+    of_features: Mapping[str, np.ndarray] = field(default_factory=dict)
     by_pixel: bool = False
     overall: np.ndarray | None = None
 
@@ -109,11 +113,51 @@ def correction(
         }
         for k in range(2)
     )
+    ends = limits(images.renders[0], picture, estimator, threshold, np.sqrt(np.diag(told.covariance)))
     return Correction(
         picture.scene.quantities, estimator, threshold, bias, bias_image, object_, image,
         told.covariance, told.covariance_image, told.status, renders, max(len(images.beside), 1),
-        limits(images.renders[0], picture, estimator, threshold, np.sqrt(np.diag(told.covariance))), adjusted,
+        ends, adjusted, _of_features(images, told, found, alike, names, ends),
     )  # fmt: skip
+
+
+def _of_features(
+    images: Images, told: PropagatedValues, found: MeasuredFeatures, alike: int, names: Sequence[str], limits: Pair
+) -> FeatureBias | None:
+    """Biases of lines and circles, found in renders, others, images of other inputs, and the renders' mean.
+
+    None where nothing tells how well they are known.
+    """
+    if told.of_features is None or images.known.keys() - images.of_features.keys():
+        return None
+    off, renders = found.offsets, len(images.renders)
+    steps, noise = off[alike:-1] - off[0], told.of_features
+    lost = found.seen.features_of(~np.isfinite(np.diag(noise)))
+    states = zip(found.states(-1), np.where(lost, status.ILL_CONDITIONED, status.OK), strict=True)
+    least, most = limits
+    return FeatureBias(
+        bias=off[:renders].mean(0),
+        moved={name: steps[[each == name for each in names]] for name in dict.fromkeys(names)}
+        | dict(images.of_features),
+        rendering=_by_rays(off[:alike], noise, by_features(found, alike) if alike > 1 else np.inf) / renders,
+        errors=noise,
+        states=tuple(status.worst(*map(str, both)) for both in states),
+        saturated=(float(least.max()), float(most.min())),
+    )
+
+
+def _by_rays(off: np.ndarray, noise: np.ndarray, pooled: float) -> np.ndarray:
+    """Covariance (q, q) by the noise of one render, of lines and circles found in some (n, q).
+
+    As pixel noise has it, scaled to what all of them together tell, ``pooled`` in its standard deviations, and where
+    one scatters more, to that.
+    """
+    if not np.isfinite(pooled):
+        return np.full_like(noise, np.inf)
+    known = np.where(np.isfinite(noise), noise, 0.0)
+    own, sigma = np.nan_to_num(off.std(0, ddof=1)), np.sqrt(np.diag(known))
+    part = np.fmax(np.divide(own, sigma, out=np.zeros_like(own), where=sigma > 0), pooled)
+    return part[:, None] * known * part
 
 
 def _adjusted(images: Images, picture: Picture, names: tuple[str, ...], moved: list[np.ndarray]) -> Adjusted | None:

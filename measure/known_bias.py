@@ -16,6 +16,7 @@ from measure.adjustment import Adjusted, variance
 from scenes.status import corrected as status_corrected
 
 if TYPE_CHECKING:
+    from imaging.bundles.biases import FeatureBias
     from scenes import Quantity
 
 RENDERING, TEXTURE = "rendering", "texture"
@@ -49,6 +50,8 @@ class Correction:
     adjusted : Adjusted, optional
         What a picture tells of inputs that the biases depend on. `bias` is that of the scene as it is, `sources` are
         those of a picture that agrees with it but for these inputs; `of_images` is of pictures that are there.
+    features : FeatureBias, optional
+        Of the lines and circles of which the values are made, where that is known: what `measure.bundle` takes off.
     """
 
     quantities: tuple[Quantity, ...]
@@ -65,6 +68,7 @@ class Correction:
     beside_renders: int = 1
     saturated: tuple[np.ndarray, np.ndarray] | None = None
     adjusted: Adjusted | None = None
+    features: FeatureBias | None = None
 
     @cached_property
     def u_bias(self) -> np.ndarray:

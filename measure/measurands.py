@@ -12,10 +12,10 @@ from measure.best import best_estimator
 from measure.covariances import less_bias, of_measured
 from measure.features.forms import FoundForm
 from measure.known_bias import Correction
-from measure.measurement import Measurement, check_method, checked_image, of_first
+from measure.measurement import Measurement, check_method, check_same, checked_image, of_first
 from measure.quantities import MeasuredFeatures, find
 from measure.saturation import saturated
-from scenes import InvalidInput, Picture, Quantity, Scene, status
+from scenes import Picture, Quantity, Scene, status
 from scenes.results import Shown, finite, value
 
 
@@ -162,22 +162,11 @@ def measure(
     """
     picture = Picture.of(scene, sensor, light)
     if correction is not None:
-        _check_same(correction, picture, estimator, threshold)
+        check_same(correction, picture, estimator, threshold)
         (found,) = measure_by(image, picture, ((correction.estimator, correction.threshold),))
         return corrected(found, correction, image)
     (found,) = measure_by(image, picture, ((estimator or best_estimator(picture), threshold),))
     return found
-
-
-def _check_same(correction: Correction, picture: Picture, estimator: str | None, threshold: float | None) -> None:
-    if correction.quantities != picture.scene.quantities:
-        raise InvalidInput("correction must be of the same measurands, got one of others")
-    for name, given, its in (
-        ("estimator", estimator, correction.estimator),
-        ("threshold", threshold, correction.threshold),
-    ):
-        if given is not None and given != its:
-            raise InvalidInput(f"{name} must be that of the correction, {its}, got {given}")
 
 
 def corrected(found: Measurements, correction: Correction, image: np.ndarray) -> Measurements:

@@ -12,6 +12,7 @@ from imaging.models.bias import bias
 from imaging.pictures import Pictures
 from measure.estimators.kinds import ESTIMATORS
 from measure.estimators.registry import known_name
+from measure.known_bias import Correction
 from measure.quantities import MeasuredFeatures, find
 from scenes import InvalidInput, Picture, Scene, status
 from scenes.arrays import BRIGHTEST, grey_levels, numbers
@@ -187,6 +188,24 @@ def _check_distance(scene: Scene) -> None:
             f"the first measurand must be a distance for measure.distance, got {scene.quantities[0].kind} "
             "(measure.measure takes all kinds)"
         )
+
+
+def check_same(correction: Correction, picture: Picture, estimator: str | None, threshold: float | None) -> None:
+    """See that a correction is of what a picture is measured for, and how.
+
+    Raises
+    ------
+    InvalidInput
+        If not.
+    """
+    if correction.quantities != picture.scene.quantities:
+        raise InvalidInput("correction must be of the same measurands, got one of others")
+    for name, given, its in (
+        ("estimator", estimator, correction.estimator),
+        ("threshold", threshold, correction.threshold),
+    ):
+        if given is not None and given != its:
+            raise InvalidInput(f"{name} must be that of the correction, {its}, got {given}")
 
 
 def check_method(estimator: Any, threshold: Any) -> None:

@@ -50,6 +50,8 @@ class PropagatedValues:
         not known.
     response, response_image : csr_array, shape (M, height * width), or None
         Derivatives of the values by the pixels, of grey levels; none of a quantity that has no value.
+    of_features : ndarray, shape (q, q), or None
+        Covariance of lines and circles (`Seen`), infinite on the diagonal of those that have none.
     """
 
     value: np.ndarray
@@ -63,6 +65,7 @@ class PropagatedValues:
     texture_variance_image: np.ndarray | None = None
     response: sparse.csr_array | None = None
     response_image: sparse.csr_array | None = None
+    of_features: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +158,8 @@ def propagate(
     if uneven is not None:
         over_parts = [np.where(np.isin(state, status.MEASURED), uneven.variances(each), np.nan) for each in responses]
         values = replace(values, texture_variance_image=over_parts[0], texture_variance=over_parts[1])
-    values = replace(values, response_image=responses[0], response=responses[1])
+    told = np.where(np.diag(lost), np.inf, errors)
+    values = replace(values, response_image=responses[0], response=responses[1], of_features=told)
     return _of_first(found, rows, errors, values, clean.shape)
 
 

@@ -143,6 +143,11 @@ class MeasuredFeatures:
         """Which quantities, bool (M,), depend on the size of a form."""
         return (self.plane.gradient[..., self.seen.of_forms] != 0).any((0, 2))
 
+    def states(self, i: int) -> np.ndarray:
+        """Status of each edge and circle in the i-th image, (E + C,)."""
+        edges = [status.worst(str(one), str(self.shape.whole[i])) for one in self.shape.counted[i]]
+        return np.array([*edges, *(str(circle.state[i]) for circle in self.circles)])
+
     def with_errors(self, errors: np.ndarray) -> MeasuredFeatures:
         """The same of one image with another covariance (q, q) of its lines and circles."""
         return replace(self, errors=errors[None])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from imaging.bundles.biases import FeatureBias, corrected, covariances
 from imaging.bundles.bundle import Bundle
 from imaging.bundles.preferred import Preferred
 from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
@@ -43,6 +44,8 @@ class BundlePrediction(Shown):
     pictures : tuple of Picture
     preferred : Preferred
         The adjustments, with the values' derivatives by lines and circles of each picture.
+    doubts : dict of str to ndarray, shape (M,), or None
+        Where biases are taken off: standard uncertainties of that by source; infinite where one is not known.
     """
 
     quantities: tuple[Quantity, ...]
@@ -54,6 +57,7 @@ class BundlePrediction(Shown):
     reason: tuple[str, ...]
     pictures: tuple[Picture, ...]
     preferred: Preferred
+    doubts: dict[str, np.ndarray] | None = None
 
     @property
     def sigma(self) -> np.ndarray:
@@ -67,8 +71,13 @@ class BundlePrediction(Shown):
 
     @property
     def u(self) -> np.ndarray:
-        """Of both together, (M,)."""
-        return np.hypot(self.sigma, self.u_placed)
+        """Of both together, (M,), and of the biases' correction where there is one."""
+        return np.hypot(np.hypot(self.sigma, self.u_placed), self.u_bias)
+
+    @property
+    def u_bias(self) -> np.ndarray:
+        """Standard uncertainties (M,) of what is taken off as bias; 0 where nothing is."""
+        return np.sqrt(sum((u**2 for u in (self.doubts or {}).values()), np.zeros(len(self.value))))
 
     def as_rows(self) -> list[dict[str, Any]]:
         """One record a quantity."""
@@ -98,6 +107,7 @@ def predict_bundle(
     cameras: Cameras = "one",
     model: ModelName = DEFAULT_MODEL,
     close: bool = True,
+    biases: Sequence[FeatureBias | None] | None = None,
 ) -> BundlePrediction:
     """Predict several pictures of one part that are adjusted together, its own features the ties.
 
@@ -110,6 +120,9 @@ def predict_bundle(
         Of the lines' and circles' variances.
     close : bool
         Whether biases are looked for (ray tracing), which leaves out what is ``clutter`` wherever that can be done.
+    biases : sequence of FeatureBias or None, optional
+        Of each picture's lines and circles, found by simulation, to be taken off (`measure.Correction.features`); noise
+        is then that of the simulated picture. None of a picture of which they are not known.
 
     Raises
     ------
@@ -129,9 +142,14 @@ def predict_bundle(
         raise InvalidInput(f"model must be one of calibrated, paper for several pictures, got {model!r}")
     bundle = Bundle.of(pictures, Freedom(sensors, shape, axes, cameras))
     each = [variance_model(model)(Pictures.of(picture)) for picture in bundle.pictures]
-    states = [_states(errors, picture, close=close) for errors, picture in zip(each, bundle.pictures, strict=True)]
-    chosen = Preferred.of(bundle, [errors.of_features for errors in each], states)
-    said = chosen.statuses(states)
+    noise = [errors.of_features for errors in each]
+    if biases is None:
+        states = [_states(errors, picture, close=close) for errors, picture in zip(each, bundle.pictures, strict=True)]
+        chosen = Preferred.of(bundle, noise, states)
+        said, doubts = chosen.statuses(states), None
+    else:
+        chosen, said = _corrected(bundle, noise, biases)
+        close, doubts = True, chosen.doubts(biases)
     scene = bundle.unknowns.scene
     return BundlePrediction(
         quantities=bundle.quantities,
@@ -143,7 +161,28 @@ def predict_bundle(
         reason=chosen.reasons,
         pictures=bundle.pictures,
         preferred=chosen,
+        doubts=doubts,
     )
+
+
+def _corrected(
+    bundle: Bundle, noise: Sequence[np.ndarray], biases: Sequence[FeatureBias | None]
+) -> tuple[Preferred, tuple[str, ...]]:
+    """The adjustments of lines and circles whose biases are taken off, and the values' statuses."""
+    if len(biases) != len(bundle.pictures):
+        raise InvalidInput(f"biases must be one for each of {len(bundle.pictures)} pictures, got {len(biases)}")
+    states, errors = [], []
+    for seen, own, one in zip(bundle.seen, noise, biases, strict=True):
+        errors.append(own if one is None else one.errors)
+        count = len(seen.names) + len(seen.circles)
+        states.append(
+            np.full(count, status.CLUTTER)
+            if one is None
+            else one.states_of(one.states, ~seen.features_of(~one.is_known))
+        )
+    chosen = Preferred.of(bundle, errors, states, covariances(biases, errors))
+    u_bias, sigma = chosen.biased(biases)[1], np.sqrt(np.diag(chosen.covariance))
+    return chosen, corrected(chosen.statuses(states), u_bias, sigma, bundle.quantities)
 
 
 def _states(errors: Errors, picture: Picture, *, close: bool) -> np.ndarray:

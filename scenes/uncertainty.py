@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
 
 from scenes.cameras.covariance import ORDER, Covariance, of_document
+from scenes.carriers import Carrier, HandEye, Stage, Turntable
 from scenes.errors import KIND
 from scenes.influences import AnyInfluence
 from scenes.model import Model
@@ -95,6 +96,12 @@ class Uncertainty(Model):
     light_place: Deviation = Uncertain(half_width=0.01)
     """Of each light's place as a part of its distance, in all directions independently: what the correction of biases
     is not sure of; known to within 1 % where not given [ratio]."""
+    hand_eye: HandEye | None = None
+    """Of where the camera sits on a robot's hand, the same in all pictures."""
+    stage: Stage | None = None
+    """Of a linear stage between pictures."""
+    turntable: Turntable | None = None
+    """Of a turntable between pictures."""
     influences: tuple[AnyInfluence, ...] = ()
     """Influence quantities of kinds that a module of your own adds (`ice --plugin MODULE`)."""
 
@@ -102,6 +109,11 @@ class Uncertainty(Model):
     def of_part(self) -> tuple[Uncertain | None, ...]:
         """How well the part's place is known: shifts along x, y and z, and turns about them; None: it is exact."""
         return _of_axes(self.part_shift, self.part_tilt_deg)
+
+    @property
+    def carriers(self) -> tuple[Carrier, ...]:
+        """What carries sensor or part from picture to picture."""
+        return tuple(each for each in (self.hand_eye, self.stage, self.turntable) if each is not None)
 
     @property
     def of_board(self) -> tuple[Uncertain | None, ...]:

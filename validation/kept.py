@@ -24,6 +24,9 @@ import imaging
 import measure
 import render
 import scenes
+from imaging.bundles.biases import FeatureBias
+from imaging.features.measurand import measurands
+from imaging.pictures import Pictures
 from measure import Correction
 from measure.adjustment import Adjusted, Adjustment
 from render import variant as variants
@@ -80,6 +83,36 @@ class _Adjusted(BaseModel):
         return {**vars(found.adjustment), **own}
 
 
+class _Features(BaseModel):
+    """A `FeatureBias` of q numbers; null is NaN, or infinite where it is an uncertainty."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    bias: _Numbers
+    moved: dict[str, list[_Numbers]]
+    rendering: list[_Numbers]
+    errors: list[_Numbers]
+    states: list[Annotated[str, Field(max_length=40)]]
+    saturated: tuple[float, float | None]
+
+    def made(self, features: int) -> FeatureBias | None:
+        """Of so many edges and circles; None where it is not as it was written."""
+        bias, count = _array(self.bias), len(self.bias)
+        moved = {
+            n: np.array([_array(row, np.inf) for row in rows]).reshape(-1, count) for n, rows in self.moved.items()
+        }
+        if any(len(row) != count for row in (*self.rendering, *self.errors)):
+            return None
+        rendering, errors = np.array([_array(row, np.inf) for row in self.rendering]), _square(self.errors)
+        if {rendering.shape, errors.shape} != {(count, count)} or not set(self.states) <= ALL:
+            return None
+        if len(self.states) != features:
+            return None
+        least, most = self.saturated
+        ends = least, np.inf if most is None else most
+        return FeatureBias(bias, moved, rendering, errors, tuple(self.states), ends)
+
+
 class _Kept(BaseModel):
     """A `Correction` of M measurands; null is NaN, or infinite where it is a standard uncertainty."""
 
@@ -96,6 +129,7 @@ class _Kept(BaseModel):
     saturated: tuple[_Numbers, _Numbers] | None
     """Least and most; null where there is no most."""
     adjusted: _Adjusted | None
+    features: _Features | None
 
 
 def correction(picture: Picture, method: Method, how: How = How()) -> Correction:
@@ -156,13 +190,21 @@ def _read(file: Path, picture: Picture, method: Method) -> Correction | None:
         *(_square(rows) for rows in (kept.covariance, kept.covariance_image)), tuple(kept.simulated), kept.renders,
         saturated=kept.saturated and tuple(_array(limit, np.inf) for limit in kept.saturated),
         adjusted=kept.adjusted and kept.adjusted.made(count),
+        features=kept.features and kept.features.made(_count(picture)),
     )  # fmt: skip
     vectors = (
         found.bias, found.bias_image, *found.sources.values(), *found.sources_image.values(), *(found.saturated or ()),
     )  # fmt: skip
     whole = all(each.shape == (count,) for each in vectors) and (kept.adjusted is None) == (found.adjusted is None)
+    whole &= (kept.features is None) == (found.features is None)
     whole &= all(each.shape == (count, count) for each in (found.covariance, found.covariance_image))
     return found if whole and len(found.simulated) == count and set(found.simulated) <= ALL else None
+
+
+def _count(picture: Picture) -> int:
+    """Of edges and circles that are measured."""
+    known = measurands(Pictures.of(picture))
+    return len(known.view.names) + len(known.circles)
 
 
 def _square(rows: list[_Numbers]) -> np.ndarray:
@@ -185,6 +227,7 @@ def _write(file: Path, found: Correction) -> None:
         "covariance_image": found.covariance_image, "simulated": list(found.simulated), "renders": found.renders,
         "saturated": found.saturated and list(found.saturated),
         "adjusted": found.adjusted and _Adjusted.facts(found.adjusted),
+        "features": found.features and vars(found.features),
     }  # fmt: skip
     part = file.with_suffix(f".{os.getpid()}")
     with suppress(OSError):
@@ -199,6 +242,8 @@ def _plain(value):
         return {name: _plain(inner) for name, inner in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(inner) for inner in value]
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
     if isinstance(value, np.ndarray):
         finite = value if value.dtype.kind == "i" else np.where(np.isfinite(value), value.astype(object), None)
         return finite.tolist()

@@ -24,6 +24,7 @@ from scipy.ndimage import binary_erosion
 
 import measure
 import render
+from imaging.features.measurand import measurands
 from imaging.light.appearance import is_plain
 from imaging.models.bias import bias
 from imaging.pictures import Pictures
@@ -258,6 +259,7 @@ def _simulated(picture: Picture, method: Method, how: How) -> Correction:
         found,
         sources={**found.sources, TEXTURE: plane},
         sources_image={**found.sources_image, TEXTURE: image},
+        features=None,
         simulated=_with_textures(picture, method, how, found.simulated),
     )
 
@@ -344,6 +346,7 @@ def _completed(
 ) -> Images:
     """With the images, or numbers, of what the scene is not sure of."""
     first, known, alike, active = renders[0], _of_unknown_kinds(picture), how.compared(picture), how.active(picture)
+    lines: dict[str, np.ndarray] = {}
     direct, whole, dimmed = cache(partial(alike.direct, active=active)), cache(alike.image), None
     if active & MANY_WAYS == {_BETWEEN} and not _is_below(picture, LARGE):
         dimmed = of_one_surface(picture, renders, partial(direct, picture), _u(picture.scene.uncertainty.reflectance))
@@ -353,11 +356,13 @@ def _completed(
     in_closed_form = _light_in_closed_form(picture, how)
     if in_closed_form is not None:
         known |= {LIGHT: in_closed_form}
+        lines = {LIGHT: _lines_by_lights(picture)}
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
         made = whole if _is_below(picture, LARGE) else direct
         changed[LIGHT] = _steps(first, made, _with_lights_moved(picture), picture)
-    return Images(renders, {name: some for name, some in changed.items() if some}, beside, known, how.by_pixel)
+    changed = {name: some for name, some in changed.items() if some}
+    return Images(renders, changed, beside, known, lines, how.by_pixel)
 
 
 def _is_below(picture: Picture, pixels: int) -> bool:
@@ -456,6 +461,17 @@ def _light_in_closed_form(picture: Picture, how: How) -> tuple[np.ndarray, np.nd
         found.append((moved.values_object - here.values_object, moved.values - here.values))
     squares = np.square(found).sum(0) if found else np.zeros((2, len(picture.scene.quantities)))
     return tuple(np.sqrt(squares.reshape(2, -1))) if np.isfinite(squares).all() else None
+
+
+def _lines_by_lights(picture: Picture) -> np.ndarray:
+    """What each light's place moves lines by, (k, q), in closed form; circles by nothing."""
+    here, known, rows = bias(Pictures.of(picture)), measurands(Pictures.of(picture)), []
+    lengths = np.linalg.norm(known.seen.along, axis=-1)
+    for other in _with_lights_moved(picture):
+        start, stop = np.moveaxis(bias(Pictures.of(other)).lines - here.lines, -1, 0)
+        rows.append(np.zeros(known.seen.count))
+        rows[-1][: 2 * len(lengths)] = np.stack([start, (stop - start) / lengths], -1).ravel()
+    return np.array(rows).reshape(-1, known.seen.count)
 
 
 def _u(told) -> float:

@@ -76,9 +76,10 @@ class Bundle:
         """The same with part and sensors expected elsewhere, by the unknowns (n,); lights go with the sensors."""
         moved, pictures = np.zeros(self.unknowns.count), []
         for k, picture in enumerate(self.pictures, 1):
-            part, sensor = (_in_degrees(self.unknowns.full(name, numbers)) for name in ("part", f"sensor {k}"))
+            part, sensor = map(_in_degrees, (self.unknowns.full("part", numbers), self.unknowns.sensor(k) @ numbers))
             pictures.append(placed(placed(picture, part), difference(np.zeros(6), sensor)))
-        for name in ("part", *(f"sensor {k}" for k in range(1, len(pictures) + 1))):
+        sensors = (f"sensor {k}" for k in range(1, len(pictures) + 1))
+        for name in ("part", *sensors, *self.unknowns.carried):
             moved[self.unknowns.slices[name]] = numbers[self.unknowns.slices[name]]
         return Bundle.of(pictures, self.freedom, self.moved + moved)
 
@@ -87,7 +88,7 @@ class Bundle:
         points, found = self.at(np.zeros(len(numbers))).places(), [0.0]
         for k, seen in enumerate(self.seen, 1):
             turned = steps(points, np.array(seen.camera.look_at))
-            full = self.unknowns.full("part", numbers) - self.unknowns.full(f"sensor {k}", numbers)
+            full = self.unknowns.full("part", numbers) - self.unknowns.sensor(k) @ numbers
             found.append(float(np.linalg.norm(seen.slopes(points) @ (turned @ full)[..., None], axis=-2).max()))
         return max(found)
 
@@ -101,15 +102,24 @@ class Bundle:
         """Derivatives (q, n) of each picture's lines and circles by the unknowns."""
         return tuple(_design(self.unknowns, seen, k) for k, seen in enumerate(self.seen, 1))
 
-    def adjusted(self, errors: Sequence[np.ndarray], counts: Sequence[np.ndarray] | None = None) -> BundleAdjustment:
+    def adjusted(
+        self,
+        errors: Sequence[np.ndarray],
+        counts: Sequence[np.ndarray] | None = None,
+        doubts: Sequence[np.ndarray] | None = None,
+    ) -> BundleAdjustment:
         """The adjustment of lines and circles whose noise has covariances (q, q), infinite on the diagonal of those
-        that are not found; of those alone that count, bool (q,), where that is said."""
+        that are not found; of those alone that count, bool (q,), where that is said.
+
+        They are weighed by that and the covariances (q, q) of their biases' correction, ``doubts``.
+        """
         whites, told = [], []
         for k, (design, covariance) in enumerate(zip(self.designs, errors, strict=True)):
             some = np.isfinite(np.diag(covariance)) & np.isfinite(design).all(1)
             some = some if counts is None else some & counts[k]
             told.append(np.where(some[:, None] & some, covariance, 0.0))
-            whites.append(whitening(told[-1]))
+            beside = 0.0 if doubts is None else np.where(some[:, None] & some, doubts[k], 0.0)
+            whites.append(whitening(told[-1] + beside))
         return BundleAdjustment(self, tuple(whites), tuple(told))
 
     def expected(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -138,7 +148,8 @@ class BundleAdjustment:
     ----------
     bundle : Bundle
     whites : tuple of ndarray, shape (q, q)
-        Combinations of each picture's lines and circles of variance 1; rows of zeros of those that do not count.
+        Combinations of each picture's lines and circles of variance 1, by noise and what is not sure of their biases;
+        rows of zeros of those that do not count.
     errors : tuple of ndarray, shape (q, q)
         Their covariances by noise; 0 of those that do not count.
     """
@@ -233,7 +244,7 @@ def _design(unknowns: Unknowns, seen: Seen, number: int) -> np.ndarray:
     solid, lengths = seen.solid, np.linalg.norm(seen.along, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         whole = by_place(seen, np.array(unknowns.scene.camera.look_at)) @ unknowns.basis("part")
-        whole = whole - by_place(seen) @ unknowns.basis(f"sensor {number}")
+        whole = whole - by_place(seen) @ unknowns.sensor(number)
         whole = whole + by_camera(seen) @ unknowns.basis(unknowns.camera(number))
         for e, name in enumerate(seen.names):
             ends = list(solid.edge(name).ends)
@@ -273,7 +284,7 @@ def _ends(unknowns: Unknowns, name: str, numbers: np.ndarray) -> np.ndarray:
 
 def _projected(unknowns: Unknowns, seen: Seen, number: int, numbers: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Image points (n, 2) of places (n, 3) on the part that is moved, before the sensor that is."""
-    part, sensor = unknowns.full("part", numbers), unknowns.full(f"sensor {number}", numbers)
+    part, sensor = unknowns.full("part", numbers), unknowns.sensor(number) @ numbers
     pivot, own = np.array(unknowns.scene.camera.look_at), np.array(seen.camera.look_at)
     there = (points - pivot) @ turn(np.degrees(part[3:])).T + pivot + part[:3]
     before = (there - own - sensor[:3]) @ turn(np.degrees(sensor[3:])) + own

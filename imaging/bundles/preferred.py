@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from imaging.bundles.biases import FeatureBias, doubts
 from imaging.bundles.bundle import Bundle, BundleAdjustment, lost
 from imaging.bundles.left_open import left_open
 from scenes import status
@@ -35,14 +36,21 @@ class Preferred:
     by_every: np.ndarray
 
     @classmethod
-    def of(cls, bundle: Bundle, errors: Sequence[np.ndarray], states: Sequence[np.ndarray]) -> Preferred:
-        """Of lines and circles of covariances (q, q) and statuses (E + C,) in each picture; ``misfit`` has no place."""
+    def of(
+        cls,
+        bundle: Bundle,
+        errors: Sequence[np.ndarray],
+        states: Sequence[np.ndarray],
+        doubts: Sequence[np.ndarray] | None = None,
+    ) -> Preferred:
+        """Of lines and circles of covariances (q, q) and statuses (E + C,) in each picture, and covariances (q, q) of
+        what is not sure of biases that are taken off; ``misfit`` has no place."""
         held = [status.OK, status.CLUTTER, status.GLANCED, status.TONE_UNKNOWN]
         found = []
         for some in ([status.OK], held):
             counts = [np.isin(each, some) for each in states]
             parts = [seen.of_features(each) for seen, each in zip(bundle.seen, counts, strict=True)]
-            found += [bundle.adjusted(errors, parts), _measured(bundle, np.any(counts, 0))]
+            found += [bundle.adjusted(errors, parts, doubts), _measured(bundle, np.any(counts, 0))]
         good, of_good, every, of_every = found
         return cls(good, every, good.is_told & of_good, every.is_told & of_every)
 
@@ -91,6 +99,20 @@ class Preferred:
         """Standard uncertainties (M,) by what is not sure of the part, each sensor and datum before, by its name."""
         good, every = self.good.known_before, self.every.known_before
         return {name: np.where(self.is_told, np.where(self.by_good, good[name], every[name]), np.inf) for name in good}
+
+    def doubts(self, biases: Sequence[FeatureBias | None]) -> dict[str, np.ndarray]:
+        """Standard uncertainties (M,) by source of what is not sure of the biases that are taken off each picture's
+        lines and circles; infinite of a value that needs one whose bias is not known."""
+        lights = [picture.lights for picture in self.every.bundle.pictures]
+        told = doubts(self.by_features, biases, lights)
+        return {name: np.where(self.by_good, u, np.inf) for name, u in told.items()}
+
+    def biased(self, biases: Sequence[FeatureBias | None]) -> tuple[np.ndarray, np.ndarray]:
+        """What is taken off the values (M,) with these, to first order, and its standard uncertainty (M,)."""
+        pairs = zip(self.by_features, biases, strict=True)
+        off = sum((pull @ np.where(b.is_known, b.bias, 0.0) for pull, b in pairs if b), np.zeros(len(self.by_good)))
+        squares = sum((u**2 for u in self.doubts(biases).values()), np.where(self.by_good, 0.0, np.inf))
+        return off, np.sqrt(squares)
 
     @property
     def u_placed(self) -> np.ndarray:

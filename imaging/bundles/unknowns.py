@@ -3,14 +3,14 @@
 Blocks, each of some full numbers of which directions are free: ``part`` a shift and a rotation vector (rad) about the
 point that the camera looks at; ``sensor 1``, ... the same of each sensor; a vertex its three coordinates, a circle
 those of its centre, two tilts of its axis about its plane's axes (rad) and its radius; ``camera`` the parameters of
-its calibration (`imaging.bundles.cameras`). All are errors beside what the scene says, features' along the axes of the
-part.
+its calibration (`imaging.bundles.cameras`); ``carrier`` errors of what carries sensor or part (`scenes.carriers`). All
+are errors beside what the scene says, features' along the axes of the part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -19,9 +19,10 @@ import numpy as np
 from imaging.bundles.cameras import root
 from imaging.features.placing import around
 from imaging.features.seen import Seen
-from imaging.geometry.projection import camera_frame
+from imaging.geometry.projection import camera_frame, sensor_position
 from imaging.pictures import Pictures
 from scenes import Circle, InvalidInput, Scene, Side
+from scenes.carriers import Place, moved
 from scenes.measurands.features import along_of, face_beside, plane_of
 from scenes.placement import prior
 
@@ -122,13 +123,16 @@ class Unknowns:
         Of the part, at the ends of the edges that are used.
     circles : tuple of str
     blocks : tuple of Block
-        The part, the V sensors, the cameras, the vertices, the circles.
+        The part, the V sensors, what carries them, the cameras, the vertices, the circles.
+    carried : dict of str to tuple of ndarray, shape (6, k)
+        By block of a carrier's errors (`scenes.carriers`): how each picture's sensor moves by its k numbers.
     """
 
     scene: Scene
     vertices: tuple[int, ...]
     circles: tuple[str, ...]
     blocks: tuple[Block, ...]
+    carried: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: Scene, pictures: tuple[Pictures, ...], seen: Seen, freedom: Freedom) -> Unknowns:
@@ -138,9 +142,11 @@ class Unknowns:
         sensors = freedom.of_sensors(len(pictures))
         blocks = [Block.of("part", np.eye(6), _in_rad(prior(scene.uncertainty)), _TURNS)]
         blocks += [_sensor(k, told, each) for k, (told, each) in enumerate(zip(sensors, pictures, strict=True), 1)]
+        carried = _carried(pictures) if "uncertain" in sensors else {}
+        blocks += [_of_one(name, moves[0].shape[1]) for name, moves in carried.items()]
         blocks += _cameras(pictures, freedom)
         blocks += _of_features(scene, vertices, seen, freedom)
-        return cls(scene, vertices, seen.circles, tuple(blocks))
+        return cls(scene, vertices, seen.circles, tuple(blocks), carried)
 
     @cached_property
     def slices(self) -> dict[str, slice]:
@@ -162,6 +168,11 @@ class Unknowns:
         whole = np.zeros((len(self._block(name).basis), self.count))
         whole[:, self.slices[name]] = self._block(name).basis
         return whole
+
+    def sensor(self, number: int) -> np.ndarray:
+        """Derivatives (6, n) of shift and turn of the sensor of a number: by its own block, and what carries it."""
+        moves = (each[number - 1] @ self.basis(name) for name, each in self.carried.items())
+        return sum(moves, self.basis(f"sensor {number}"))
 
     @cached_property
     def units(self) -> np.ndarray:
@@ -214,6 +225,30 @@ def _sensor(number: int, told: Sensors, pictures: Pictures) -> Block:
     turns = [aside, aside, 0.0 if said.sensor_roll_deg is None else said.sensor_roll_deg.u]
     reach = 0.0 if said.sensor_distance is None else said.sensor_distance.u
     return Block.of(f"sensor {number}", directions, _in_rad(np.array([0.0, 0.0, reach, *turns])), _TURNS)
+
+
+def _carried(pictures: tuple[Pictures, ...]) -> dict[str, tuple[np.ndarray, ...]]:
+    """Of errors that pictures share, ``carrier``, and of those of their own, ``carrier 1``, ..."""
+    of, places = [each.scene.uncertainty.carriers for each in pictures], [place_of(each) for each in pictures]
+    found = {"carrier": tuple(moved(*one, own=False) for one in zip(of, places, strict=True))}
+    for k, one in enumerate(zip(of, places, strict=True)):
+        own = moved(*one, own=True)
+        found[f"carrier {k + 1}"] = tuple(own if i == k else np.zeros_like(own) for i in range(len(pictures)))
+    if len({each.shape[1] for each in found["carrier"]}) > 1:
+        raise InvalidInput("pictures must be of the same hand_eye, stage and turntable, got others")
+    return {name: moves for name, moves in found.items() if moves[0].shape[1]}
+
+
+def place_of(pictures: Pictures) -> Place:
+    """Where the sensor of one picture is said to stand."""
+    camera, pose = pictures.scene.camera, pictures.sensors
+    axes = np.stack(camera_frame(camera, pose))
+    return Place(sensor_position(camera, pose), axes, np.array(camera.look_at), float(pose[..., 1]))
+
+
+def _of_one(name: str, count: int) -> Block:
+    """Numbers of variance 1."""
+    return Block(name, np.eye(count), np.ones(count), np.zeros(count, bool))
 
 
 def _cameras(pictures: tuple[Pictures, ...], freedom: Freedom) -> Iterator[Block]:

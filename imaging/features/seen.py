@@ -107,6 +107,11 @@ class Seen:
             which[self.numbers(c)] = some[edges + c]
         return which
 
+    def features_of(self, some: np.ndarray) -> np.ndarray:
+        """Which edges and circles, bool (E + C,), have one of some parameters, bool (q,), at least."""
+        edges = some[: 2 * len(self.names)].reshape(-1, 2).any(1)
+        return np.array([*edges, *(some[self.numbers(c)].any() for c in range(len(self.circles)))], bool)
+
     @property
     def normals(self) -> np.ndarray:
         """Unit normal (-t_y, t_x) of each line, shape (..., E, 2)."""

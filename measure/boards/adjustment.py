@@ -64,7 +64,7 @@ def begin(boards: Sequence[Board], square: float, image_shape: tuple[int, int], 
 
 def adjust(boards: Sequence[Board], square: float, model: Model, start: np.ndarray) -> Adjusted:
     """Least squares of all residuals, whitened by the corners' covariance, from ``start``."""
-    views = [_View.of(board, square) for board in boards]
+    views = [View.of(board, square) for board in boards]
     k = len(model.names)
 
     def residual(parameters: np.ndarray) -> np.ndarray:
@@ -109,7 +109,7 @@ def _inverse(jacobian: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class View:
     """One board's measured corners: places on it, images, and the whitening (m, 2, 2) of each."""
 
     places: np.ndarray
@@ -117,7 +117,7 @@ class _View:
     whiten: np.ndarray
 
     @classmethod
-    def of(cls, board: Board, square: float) -> _View:
+    def of(cls, board: Board, square: float) -> View:
         good = board.measured
         whiten = np.linalg.inv(np.linalg.cholesky(board.covariance[good]))
         return cls(_object(board, square)[good], board.corners[good], whiten)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imaging.bundles.biases import FeatureBias
 from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
 from imaging.features.measurand import measurands
 from imaging.models import DEFAULT_MODEL, variance_model
@@ -16,7 +17,7 @@ from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import STEP, pulled
 from planner.budgeting.sources import Source, sources
 from planner.budgeting.station import Station
-from planner.budgeting.terms import DATUMS, MODEL, NOISE, PATTERN, Term, stated, still_noise
+from planner.budgeting.terms import DATUMS, MODEL, NOISE, PATTERN, Term, of_doubts, stated, still_noise
 from planner.bundles import BundlePrediction, predict_bundle
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
@@ -25,6 +26,7 @@ from scenes.cameras.covariance import ORDER
 
 _ADJUSTED = ("part_shift", "part_tilt_deg", "principal_point_px")
 _OF_SENSORS = ("sensor_deg", "sensor_roll_deg", "sensor_distance")
+_OF_CARRIERS = ("hand_eye", "stage", "turntable")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,16 +62,19 @@ def bundle_budget(
     shape: Shape = "in_space",
     axes: Axes = "known",
     cameras: Cameras = "one",
+    biases: Sequence[FeatureBias | None] | None = None,
     p: float = 0.95,
 ) -> BundleBudget:
     """The uncertainty of every measurand of pictures adjusted together; one budget a measurand.
 
-    Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``camera`` and ``datums``; a sensor that
-    counts as known has those of its pose, with its number.
+    Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``carrier`` (errors of hand_eye, stage and
+    turntable that pictures share), ``carrier 1``, ... (each picture's own), ``camera`` and ``datums``; a sensor that
+    counts as known has those of its pose, with its number. Where biases are taken off, what that is not sure of
+    (``bias by ...``) stands in place of the model error.
 
     Parameters
     ----------
-    pictures, sensors, shape, axes, cameras
+    pictures, sensors, shape, axes, cameras, biases
         As of `planner.predict_bundle`.
     p : float
         Coverage probability of the expanded uncertainties.
@@ -79,34 +84,53 @@ def bundle_budget(
     InvalidInput
         If the pictures do not tell a measurand.
     """
-    told = predict_bundle(pictures, sensors, shape=shape, axes=axes, cameras=cameras)
+    told = predict_bundle(pictures, sensors, shape=shape, axes=axes, cameras=cameras, biases=biases)
     for quantity, sigma, state, why in zip(told.quantities, told.sigma, told.status, told.reason, strict=True):
         if not np.isfinite(sigma):
             raise InvalidInput(f"{quantity.name} must be measurable for a budget, got {state}: {why}")
+    return BundleBudget(told, budgets_of(told, sensors, p))
+
+
+def budgets_of(
+    told: BundlePrediction, sensors: Sensors | tuple[Sensors, ...] = "uncertain", p: float = 0.95
+) -> tuple[Budget, ...]:
+    """Those of what pictures tell, in its order; there is none of a value that they do not tell.
+
+    Parameters
+    ----------
+    told : BundlePrediction
+        As it was predicted, or measured.
+    sensors, p
+        As of `bundle_budget`.
+    """
     given, slopes = _sources(told, Freedom(sensors).of_sensors(len(told.pictures)))
     inputs, budgets = tuple(source.as_input for source in given), []
     for m, (quantity, slope, rows) in enumerate(zip(told.quantities, slopes, _terms(told), strict=True)):
+        if not np.isfinite(told.sigma[m]):
+            continue
         by_name = {source.name: float(c) for source, c in zip(given, slope, strict=True)}
         by_name |= {row.name: row.sensitivity for row in rows}
         whole = (*inputs, *(row.as_input for row in rows))
         budgets.append(combined(quantity.name, told.units[m], float(told.value[m]), whole, by_name, p))
-    return BundleBudget(told, tuple(budgets))
+    return tuple(budgets)
 
 
 def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[Source, ...], np.ndarray]:
     """What moves places in the images beside what is adjusted, and the values' derivatives by it, (M, n)."""
     found: dict[str, tuple[Source, np.ndarray]] = {}
+    own = {e.name for each in told.pictures for c in each.scene.uncertainty.carriers for e in c.errors if e.own}
     for k, (picture, pull) in enumerate(zip(told.pictures, told.preferred.by_features, strict=True)):
         features = Features(Pictures.of(picture))
         here = Station.nominal(features.pictures)
         for each in sources(picture.scene):
             of_sensor = each.name.startswith(_OF_SENSORS)
             adjusted = each.name.startswith(_ADJUSTED) or each.name in ORDER or (of_sensor and sensors[k] != "known")
-            if each.kind != "geometry" or adjusted:
+            carried = each.name.startswith(_OF_CARRIERS) and "uncertain" in sensors
+            if each.kind != "geometry" or adjusted or carried:
                 continue
             step = STEP * each.scale
             ahead, behind = features.errors([each.moved(here, step), each.moved(here, -step)])
-            name = f"{each.name} {k + 1}" if of_sensor else each.name
+            name = f"{each.name} {k + 1}" if of_sensor or each.name in own else each.name
             slope = pulled(pull, ((ahead - behind) / (2 * step))[None])[0]
             found[name] = replace(each, name=name), found[name][1] + slope if name in found else slope
     count = len(told.quantities)
@@ -128,12 +152,15 @@ def _terms(told: BundlePrediction) -> list[list[Term]]:
     for m, unit in enumerate(told.units):
         noise = float(told.sigma[m])
         rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), unit, 1.0, "noise")]
-        rows.append(Term(MODEL, 0.0, Uncertain(half_width=MOST * noise), unit, 1.0))
+        if told.doubts is None:
+            rows.append(Term(MODEL, 0.0, Uncertain(half_width=MOST * noise), unit, 1.0))
+        else:
+            rows += of_doubts(told.doubts, m, unit)
         rows += [Term(name, 0.0, Uncertain(sd=float(u[m])), unit, 1.0) for name, u in before.items() if u[m] > 0]
         found.append(rows + stated(scene, unit, float(told.value[m])))
     return found
 
 
 def _is_place(name: str) -> bool:
-    """Whether a block is the part's place, a sensor's or a camera's numbers, not a datum."""
-    return name == "part" or name.startswith(("sensor ", "camera"))
+    """Whether a block is the part's place, a sensor's, a carrier's or a camera's numbers, not a datum."""
+    return name == "part" or name.startswith(("sensor ", "camera", "carrier"))

@@ -78,7 +78,7 @@ class Source(Believed):
 
 def sources(scene: Scene) -> tuple[Source, ...]:
     """All inputs that move what a picture shows; temperature, rounding and the like are not among them."""
-    return (*_numbers(scene), *_poses(scene), *_calibrated(scene), *_influences(scene))
+    return (*_numbers(scene), *_poses(scene), *_carried(scene), *_calibrated(scene), *_influences(scene))
 
 
 def _influences(scene: Scene) -> Iterator[Source]:
@@ -139,6 +139,15 @@ def _poses(scene: Scene) -> Iterator[Source]:
     for i, axis in enumerate("xy"):
         move = _tuple_moved("principal_px", i)
         yield from _one(f"principal_point_px.{axis}", said.principal_point_px, "px", "geometry", 100.0, move)
+
+
+def _carried(scene: Scene) -> Iterator[Source]:
+    """Errors of what carries sensor or part."""
+    for carrier in scene.uncertainty.carriers:
+        for i, error in enumerate(carrier.errors):
+            told = Uncertain(sd=error.u) if error.u > 0 else None
+            unit, scale = (scene.units, scene.camera.distance) if error.unit == "length" else (error.unit, 1.0)
+            yield from _one(error.name, told, unit, "geometry", scale, lambda s, d, c=carrier, i=i: s.carried(c, i, d))
 
 
 def _calibrated(scene: Scene) -> Iterator[Source]:

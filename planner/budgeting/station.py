@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imaging.bundles.unknowns import place_of
 from imaging.geometry.lens import image_centre, recorded
 from imaging.geometry.projection import project_ideal
 from imaging.pictures import Pictures
 from imaging.pose_scatter import LEAST_SINE
 from scenes import Scene
+from scenes.carriers import Carrier
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,12 @@ class Station:
         """The same of a light."""
         moved = _moved(self.lights[light], step_deg, which)
         return replace(self, lights=(*self.lights[:light], moved, *self.lights[light + 1 :]))
+
+    def carried(self, carrier: Carrier, which: int, step: float) -> Station:
+        """With the sensor moved by a step of one error of what carries it: the part moves the other way."""
+        move = -step * carrier.moves(place_of(self.pictures))[:, which]
+        shift, tilt = np.array(self.shift) + move[:3], np.array(self.tilt_deg) + np.degrees(move[3:])
+        return replace(self, shift=tuple(shift), tilt_deg=tuple(tilt))
 
     def changed(self, name: str, which: int, step: float) -> Station:
         """With one number of an attribute that is a tuple changed by a step."""

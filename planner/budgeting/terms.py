@@ -79,7 +79,7 @@ def terms(
     known, found = measurands(pictures), []
     for m, (each, (noise, *still)) in enumerate(zip(forecasts, unbiased(pictures, variances), strict=True)):
         sigma = float(np.sqrt(variances[m]))
-        rows = _of_bias(known, m, each, sigma, biases, biased) if doubts is None else _of_doubts(doubts, m, each.unit)
+        rows = _of_bias(known, m, each, sigma, biases, biased) if doubts is None else of_doubts(doubts, m, each.unit)
         if together is not None and together[m] > 0:
             rows.append(Term(TOGETHER, 0.0, Uncertain(sd=float(together[m])), each.unit, 1.0))
         found.append([noise, *rows, *still])
@@ -119,7 +119,7 @@ def _of_bias(
     return [Term(MODEL, 0.0, Uncertain(half_width=limit), each.unit, 1.0)]
 
 
-def _of_doubts(doubts: Mapping[str, np.ndarray], m: int, unit: str) -> list[Term]:
+def of_doubts(doubts: Mapping[str, np.ndarray], m: int, unit: str) -> list[Term]:
     """What is not known at all is no number: the value's status says so."""
     known = {name: float(u[m]) for name, u in doubts.items() if np.isfinite(u[m])}
     return [Term(BIAS + name, 0.0, Uncertain(sd=u), unit, 1.0) for name, u in known.items() if u > 0]

@@ -4,9 +4,11 @@ Two convex parts in exact images (`imaging.blurred.whole`): two and three pictur
 sensors drawn anew within what is known of them, each set exposed once; a third sensor 0.3 degrees and 0.5 mm from where
 it is said, of which nothing is known. Measured over told variance must lie within the two-sided interval of chance for
 all rows together (Sidak, 1 %), and that of all rows pooled, means within 0.3 sigma and chance. Then the first with
-three rendered pictures of `bracket_station`, known and uncertain, with a height and an angle between faces: there means
-are of all that the pictures show, light between faces too. Controls that must fail: variances 1.3 times too large or
-too small; sensors taken for known that are not; each kind of the sensors' errors left out of what is unknown.
+three rendered pictures of `bracket_station`, known and uncertain, with a height and an angle between faces: there
+biases, by light between faces too, are those of other renders, taken off; means must be within 0.3 of the standard
+uncertainty of noise and correction together. Controls that must fail: variances 1.3 times too large or too small;
+sensors taken for known that are not; each kind of the sensors' errors left out of what is unknown; the station's biases
+left on.
 """
 
 from __future__ import annotations
@@ -29,13 +31,18 @@ from imaging.bundles.unknowns import Freedom
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from imaging.placed import difference, placed
+from render import Quality
 from scenes import Picture, Scene
 from tests import placements as parts
 from tests.bundles import UNSURE
+from validation import kept
+from validation.remeasured import Method
 
 LIGHT, SENSORS = (22.0, 60.0), ((28.0, 300.0), (30.0, 60.0), (25.0, 200.0))
 STATION = ((20, 0), (20, 225)), ((20, 120), (20, 315)), ((20, 240), (20, 45))
 CONFIDENCE, BIAS = 0.99, 0.3
+PITCH_UM = 3.45  # of the station's camera
+OTHERS, RENDERS = 1000, 6  # where the seeds begin of renders whose mean is measured, and how many they are
 _CHANCE = 3.3  # standard deviations: 0.1 %
 _KNOWN = {"from": "known", "datums": [], "datum_sd": None}
 
@@ -46,6 +53,9 @@ class Row:
 
     label: str
     pulls: np.ndarray
+    doubt: float = 0.0
+    rays: float = 0.0
+    """u(bias) over sigma, of a correction; and what rays leave of renders that are corrected."""
 
     @property
     def ratio(self) -> float:
@@ -76,32 +86,50 @@ def is_one(rows: list[Row], factor: float = 1.0) -> bool:
 
 
 def centred(rows: list[Row]) -> list[bool]:
-    """Whether means are within `BIAS` standard deviations and chance."""
+    """Whether means are within `BIAS` combined standard uncertainties, of noise and correction, beyond chance and what
+    rays leave."""
     tail = (1 - CONFIDENCE ** (1 / len(rows))) / 2
-    return [bool(abs(row.pulls.mean()) < BIAS - norm.ppf(tail) / np.sqrt(len(row.pulls))) for row in rows]
+    chance = -norm.ppf(tail)
+    return [
+        bool(
+            abs(row.pulls.mean()) < BIAS * np.hypot(1, row.doubt) + chance * np.hypot(row.rays, len(row.pulls) ** -0.5)
+        )
+        for row in rows
+    ]
 
 
 def of_noise(
-    label: str, images: list[np.ndarray], pictures: list[Picture], sensors, draws: int, seed: int
+    label: str,
+    images: list[np.ndarray],
+    pictures: list[Picture],
+    sensors,
+    draws: int,
+    seed: int,
+    corrections: list[measure.Correction] | None = None,
+    renders: int = 1,
 ) -> list[Row]:
     """Pulls of the trusted values of noisy images, by what noise alone does."""
-    rng, found, sigma, states = np.random.default_rng(seed), [], [], []
+    rng, found = np.random.default_rng(seed), []
     for first in range(0, draws, 10):
         count = min(10, draws - first)
         noise = pictures[0].scene.noise
         shots = [(render.expose(clean, noise, rng, count), one) for clean, one in zip(images, pictures, strict=True)]
-        told = measure.bundle(shots, sensors)
-        found.append(told.value)
-        sigma.append(told.sigma)
-        states.append(told.status)
-    values, told_by = np.concatenate(found), np.concatenate(sigma)
-    good = np.concatenate(states) == "ok"
+        found.append(measure.bundle(shots, sensors, corrections=corrections))
+    told = found[0]
+    values, told_by, doubts = (
+        np.concatenate([getattr(f, name) for f in found]) for name in ("value", "sigma", "u_bias")
+    )
+    good = np.concatenate([each.status for each in found]) == "ok"
     rows = []
     for m, name in enumerate(told.names):
         print(f"  {label} {name}: {int(good[:, m].sum())} of {draws} ok")
         if good[:, m].mean() > 0.95:
             some = good[:, m]
-            rows.append(Row(f"{label} {name}", (values[some, m] - told.nominal[m]) / told_by[some, m]))
+            doubt = float(np.nan_to_num(doubts[some, m] / told_by[some, m]).mean())
+            rays = 0.0 if corrections is None else told.doubts["rendering"][m] / told.sigma[0, m]
+            rays *= np.sqrt(1 + min(each.renders for each in corrections or ()) / renders) if rays else 1.0
+            pulls = (values[some, m] - told.nominal[m]) / told_by[some, m]
+            rows.append(Row(f"{label} {name}", pulls, doubt, float(rays)))
     return rows
 
 
@@ -177,7 +205,8 @@ def report(rows: list[Row]) -> bool:
     if not rows:
         return False
     for row, held, mid in zip(rows, inside(rows), centred(rows), strict=True):
-        told = f"measured / told {row.ratio:.3f}, mean {row.pulls.mean():+.3f} sigma, {len(row.pulls)} sets"
+        mean = f"mean {row.pulls.mean():+.3f} sigma, u(bias) {row.doubt:.2f}, rays {row.rays:.2f}"
+        told = f"measured / told {row.ratio:.3f}, {mean}, {len(row.pulls)} sets"
         print(f"{row.label:40} {told}{'' if held else '  OUTSIDE CHANCE'}{'' if mid else '  OFF'}")
     print(f"all {len(rows)} rows: measured / told {pooled(rows):.3f}")
     return all(inside(rows)) and all(centred(rows)) and is_one(rows)
@@ -197,21 +226,27 @@ def of_part(scene: Scene, draws: int, sets: int, seed: int) -> tuple[list[Row], 
     return rows, wrong, controls(tri, draws, seed)
 
 
-def of_station(draws: int, seed: int) -> list[Row]:
-    """Rows of the rendered station."""
+def of_station(draws: int, seed: int, smaller: int = 1) -> tuple[list[Row], list[Row]]:
+    """Rows of the rendered station, biases taken off, and those of three known sensors with biases left on."""
     made = station()
+    if smaller > 1:
+        made = made.with_(camera={"pixel_pitch_um": smaller * PITCH_UM})
     tri, rows = [Picture.of(made, sensor, light) for sensor, light in STATION], []
-    clean = [render.image(each) for each in tri]
+    clean = [np.mean([render.image(each, quality=Quality(seed=OTHERS + k)) for k in range(RENDERS)], 0) for each in tri]
+    told = [kept.correction(each, Method(measure.best_estimator(each))) for each in tri]
+    left = of_noise("station, 3 known, biased", clean, tri, "known", draws, seed)
     for count in (2, 3):
         for sensors in ("known", "uncertain"):
-            rows += of_noise(f"station, {count} {sensors}", clean[:count], tri[:count], sensors, draws, seed)
-    return rows
+            label = f"station, {count} {sensors}"
+            rows += of_noise(label, clean[:count], tri[:count], sensors, draws, seed, told[:count], RENDERS)
+    return rows, left
 
 
 def bundles(
     draws: Annotated[int, typer.Option(help="Noisy sets of each row.")] = 200,
     sets: Annotated[int, typer.Option(help="Sets of sensors that are drawn anew.")] = 100,
     seed: Annotated[int, typer.Option()] = 1,
+    smaller: Annotated[int, typer.Option(help="By what the station's pictures are smaller, each way.")] = 1,
     only: Annotated[str, typer.Option(help="exact: two parts in exact images; station: bracket_station.")] = "",
 ) -> None:
     """Two and three pictures adjusted together: values scatter as told; exact 40 minutes, station 30."""
@@ -223,7 +258,10 @@ def bundles(
                 found = of_part(scene, draws, sets, seed)
                 rows, wrong, passed = rows + found[0], wrong + found[1], passed + found[2]
     if only != "exact":
-        rows += of_station(draws, seed)
+        told, left = of_station(draws, seed, smaller)
+        rows += told
+        if all(centred(left)):
+            passed.append("station's biases")
     good = report(rows)
     fooled = sum(is_one(rows, factor) for factor in (1.3, 1 / 1.3)) + len(passed)
     fooled += bool(wrong) and all(inside(wrong))

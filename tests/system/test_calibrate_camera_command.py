@@ -48,13 +48,14 @@ def test_from_pictures_to_a_lens_and_a_budget(folder, tmp_path):
     out, picture = tmp_path / "lens.toml", tmp_path / "residuals.png"
     done = CliRunner().invoke(app, [
         "calibrate-camera", *files(folder), "--square", "25", "--model", "k1,k2,p1,p2", "-o", str(out),
-        "--scene", str(scene), "--residuals", str(picture), "--json",
+        "--scene", str(scene), "--residuals", str(picture), "--next", "distance", "--json",
     ])  # fmt: skip
     assert done.exit_code == 0, done.stderr
     told = json.loads(done.stdout)
     away = (np.array(told["values"]) - SMALL.values[:8]) / told["sd"]
     assert np.abs(away).max() < 4  # margin: 4 standard deviations
     assert told["status"] == "ok"
+    assert 0 < told["next"]["U_then"] < told["next"]["U"]
     assert [len(told["boards"]), len(told["left_out"])] == [5, 2]
     assert all("must" in each["reason"] for each in told["left_out"])
     assert "nothing.png" in done.stderr
@@ -89,6 +90,9 @@ def test_what_cannot_be_is_one_line(folder, monkeypatch, capsys, tmp_path):
     assert refused(monkeypatch, capsys, *some, "--square", 0)[1] == "--square must be at least 1e-09, got 0.0"
     assert refused(monkeypatch, capsys, *some, "--square", 25, "--units", "ell")[0] == 2
     assert refused(monkeypatch, capsys, *some, "--square", 25, "--model", "k4")[1].startswith("model must be none, or")
+    assert refused(monkeypatch, capsys, *some[:3], "--square", 25, "--next", "distance")[1].endswith(
+        "--next must be used with --scene, got 'distance' alone"
+    )
     cv2.imwrite(str(tmp_path / "small.png"), np.zeros((60, 80), np.uint8))
     assert (
         "must be 320 x 240 px"

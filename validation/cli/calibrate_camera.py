@@ -12,7 +12,7 @@ import typer
 import scenes
 from scenes import InvalidInput
 from scenes.files.image import Size
-from validation.cli.common import Json, check_number, commands, progress, say, taking
+from validation.cli.common import Json, check_number, commands, first_picture, progress, say, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
@@ -59,6 +59,10 @@ class Options:
     scene: Annotated[
         str | None, typer.Option(metavar="SCENE", help="Print its [camera] and [uncertainty] as they should read.")
     ] = None
+    following: Annotated[
+        str | None,
+        typer.Option("--next", metavar="MEASURAND", help="Propose the next board, for U of this measurand of SCENE."),
+    ] = None
     residuals: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Picture of the residuals.")] = None
     as_json: Json = False
 
@@ -70,6 +74,8 @@ def calibrate_camera_command(given: Options) -> None:
 
     The board is a chessboard; with --dots a grid of dots; with --charuco a ChArUco board, with --markers a grid of
     markers: both need --shape and --marker, and a part of them is enough.
+
+    --next proposes where to hold the board for the next photograph, and says what that would leave of U.
 
     -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
     boards do not determine the focal length.
@@ -91,12 +97,16 @@ def calibrate_camera_command(given: Options) -> None:
         print(f"left out: {reason}", file=sys.stderr)
     found = measure.calibrate_camera(seen.boards, given.square, seen.image_shape, given.model, given.square_sd)
     lines = camera_table.scene_lines(found, scene, beside) if scene is not None else None
+    proposal = _proposal(given, found, seen)
     written = _write_files(found, seen, given.output, given.residuals)
     if given.as_json:
         told = camera_table.facts(found, seen, given.units)
-        say(told if lines is None else {**told, "scene": lines}, True, "")
+        told |= {} if lines is None else {"scene": lines}
+        say(told if proposal is None else {**told, "next": proposal.facts}, True, "")
     else:
         _show(found, seen, given.units, lines)
+        if proposal is not None:
+            console().print(proposal.text, highlight=False)
         for path in written:
             console().print(f"written: {path}", highlight=False)
     raise typer.Exit(1 if found.status == status.ILL_CONDITIONED else 0)
@@ -112,9 +122,23 @@ def _checked(given: Options):
     if given.units not in UNITS:
         raise InvalidInput(f"--units must be one of {', '.join(UNITS)}, got {given.units!r}")
     printed = _printed(given)
+    if given.following is not None and given.scene is None:
+        raise InvalidInput(f"--next must be used with --scene, got {given.following!r} alone")
     check_file("--output", given.output, ".toml")
     check_file("--residuals", given.residuals, ".png")
     return printed
+
+
+def _proposal(given: Options, found, seen):
+    """Of the next board; None where none is asked for, or the boards so far determine no camera."""
+    from scenes import status
+
+    if given.following is None or given.scene is None or found.status == status.ILL_CONDITIONED:
+        return None
+    from validation.next_board import propose
+
+    picture = first_picture(scenes.load(given.scene), None, None)
+    return propose(found, seen.boards, given.square, picture, given.following)
 
 
 def _printed(given: Options):

@@ -166,7 +166,8 @@ def _measure_scene(given: Options) -> NoReturn:
     shown = [each if place is None else place.picture for each, place in zip(shown, places, strict=True)]
     if given.together is not None:
         named = [file for file, *_ in files]
-        together.measured(named, images, shown, given.together, given.estimator, as_json=given.as_json)
+        correct = not given.as_measured
+        together.measured(named, images, shown, given.together, given.estimator, correct=correct, as_json=given.as_json)
     inspected = inspection.inspect(*(_measured(given, image, each) for image, each in zip(images, shown, strict=True)))
     if given.inspection is not None:
         from validation.report import inspection_files
@@ -183,7 +184,7 @@ def _check_together(given: Options) -> None:
         raise InvalidInput(f"--together must be used with --also, got {given.together!r} alone")
     if given.together not in ("known", "uncertain", "unknown"):
         raise InvalidInput(f"--together must be one of known, uncertain, unknown, got {given.together!r}")
-    for option in ("--inspection", "--as-measured", "--serial"):
+    for option in ("--inspection", "--serial"):
         if given.of_scenes[option]:
             raise InvalidInput(f"{option} must be left out with --together, got it")
 

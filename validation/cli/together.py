@@ -10,8 +10,8 @@ import typer
 from rich.table import Table
 
 import scenes
-from scenes.status import legend
-from validation.cli.common import say
+from scenes.status import CLUTTER, legend, unsure
+from validation.cli.common import progress, say
 from validation.report import cells
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -19,18 +19,20 @@ from validation.strict_json import plain
 if TYPE_CHECKING:
     import measure
     from imaging.bundles.unknowns import Sensors
+    from validation.bundles import InspectedBundle
 
 
 def measured(
     files: list[Path], images: list[np.ndarray], shown: list[scenes.Picture], sensors: str, estimator: str | None,
-    *, as_json: bool,
+    *, correct: bool, as_json: bool,
 ) -> NoReturn:  # fmt: skip
     """Adjust the pictures together and say what they tell; exit status 1 where something could not be measured."""
-    import measure
+    from validation import bundles
 
     shots = list(zip(images, shown, strict=True))
-    found = measure.bundle(shots, cast("Sensors", sensors), estimator=estimator)
-    rows = facts(found)
+    with progress("simulating the pictures for their biases", "renders", at_once=True):
+        inspected = bundles.inspect(shots, cast("Sensors", sensors), estimator, correct=correct)
+    found, rows = inspected.found, facts(inspected)
     if as_json:
         told = {"files": [str(file) for file in files], "measurands": rows, "covariance": plain(found.covariance)}
         say(told | {"p_value": float(found.p_value), "points": _points(found)}, True, "")
@@ -41,15 +43,26 @@ def measured(
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
 
 
-def facts(found: measure.Bundled) -> list[dict[str, Any]]:
+def facts(inspected: InspectedBundle) -> list[dict[str, Any]]:
     """One record a measurand; null for what is not known."""
-    rows = []
-    for quantity, row, why in zip(found.quantities, found.as_rows(), found.reason, strict=True):
-        zone = quantity.tolerance
-        kept = {name: row[name] for name in ("name", "kind", "unit", "value", "sigma", "u_placed", "u", "nominal")}
+    found, rows = inspected.found, []
+    keys = "name", "kind", "unit", "value", "sigma", "u_placed", "u_bias", "u", "nominal"
+    for m, (quantity, row) in enumerate(zip(found.quantities, found.as_rows(), strict=True)):
+        zone, good = quantity.tolerance, row["value"] is not None and np.isfinite(found.u_bias[m])
         limits = zone and {"plus": zone.plus, "minus": zone.minus}
-        rows.append({**kept, "tolerance": limits, "status": row["status"], "reason": why})
+        told = {"bias": found.bias[m] if good else None, "tolerance": limits, "U": inspected.U[m]}
+        decided = {"decision": inspected.decisions[m], "status": row["status"], "reason": _reason(inspected, m)}
+        rows.append({name: row[name] for name in keys} | told | decided)
     return plain(rows)
+
+
+def _reason(inspected: InspectedBundle, m: int) -> str:
+    """Why a value is not told, or not relied on although its bias is taken off."""
+    found, quantity = inspected.found, inspected.found.quantities[m]
+    if found.reason[m] or found.status[m] != CLUTTER or np.isnan(found.u_bias[m]):
+        return found.reason[m]
+    half = 0.0 if quantity.tolerance is None else quantity.tolerance.half
+    return f"{quantity.name}: {unsure(float(found.u_bias[m]), float(found.sigma[m]), half, found.units[m])}"
 
 
 def _points(found: measure.Bundled) -> list[dict[str, Any]]:
@@ -58,17 +71,20 @@ def _points(found: measure.Bundled) -> list[dict[str, Any]]:
 
 def table(rows: list[dict[str, Any]], pictures: int) -> Table:
     """The same for a terminal."""
-    columns = "name", "kind", "value", "sigma", "u", "unit", "nominal", "tolerance", "status"
-    title, words = f"Measurands of {pictures} pictures together (+- u)", ("name", "kind", "unit")
+    columns = "name", "kind", "value", "sigma", "u_bias", "u", "U", "unit", "nominal", "tolerance", "decision", "status"
+    title, words = f"Measurands of {pictures} pictures together (+- u)", ("name", "kind", "unit", "decision")
     shown = cells.table(title, *columns, words=words, caption=_CAPTION)
     for row in rows:
         value = "-" if row["value"] is None else f"{row['value']:.6g}"
-        sigma, u = ("-" if row[name] is None else f"{row[name]:.2g}" for name in ("sigma", "u"))
+        spread = ("-" if row[name] is None else f"{row[name]:.2g}" for name in ("sigma", "u_bias", "u", "U"))
         zone = row["tolerance"]
         limits = "-" if zone is None else f"+{zone['plus']:g} -{zone['minus']:g}"
-        about = row["name"], row["kind"], value, sigma, u, row["unit"]
-        shown.add_row(*about, f"{row['nominal']:.6g}", limits, row["status"])
+        about = row["name"], row["kind"], value, *spread, row["unit"]
+        shown.add_row(*about, f"{row['nominal']:.6g}", limits, row["decision"] or "-", row["status"])
     return shown
 
 
-_CAPTION = "sigma: by noise. u: also by what is not known before of part, sensors and camera. Biases are not taken off."
+_CAPTION = (
+    "sigma: by noise. u_bias: of the correction of biases. u: both, and what is not known before of part, sensors and "
+    "camera. U: 95 %, of all that the scene says."
+)

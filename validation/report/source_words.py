@@ -35,7 +35,8 @@ _WORDS = {
 _OF_PARTS = {
     "sensor_deg": "direction of the camera", "light_deg": "direction of the lamp", "part_shift": "place of the part",
     "part_tilt_deg": "tilt of the part", "board_shift": "place of the board", "board_tilt_deg": "tilt of the board",
-    "principal_point_px": "principal point",
+    "principal_point_px": "principal point", "hand_eye": "place of the camera on the hand",
+    "stage": "linear stage", "turntable": "turntable",
 }  # fmt: skip
 
 

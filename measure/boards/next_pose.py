@@ -1,0 +1,127 @@
+"""Where to hold a board for the next photograph of a calibration, so that something is known best.
+
+A photograph more adds the Fisher information of its corners about the camera, less what its own pose takes of it: with
+J and K the whitened derivatives by camera and pose, J^T (1 - K K+) J. What is asked is a linear function of the camera.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import cv2
+import numpy as np
+
+from measure.boards.adjustment import View
+from measure.boards.camera import CameraCalibration
+from measure.boards.chessboard import Board
+from measure.boards.parameters import Model
+from scenes.errors import InvalidInput
+
+_PLACES = -0.3, 0.0, 0.3  # of the board's middle, parts of the image's sides beside its middle
+_NEARER = 0.7, 1.0, 1.4  # over the median distance of the boards that were seen
+_TILTS, _TOWARDS, _ROLLS = (15.0, 35.0), range(0, 360, 45), (0.0, 90.0)  # degrees
+_MARGIN = 4.0  # px from the image's ends, that outer squares stay
+
+
+@dataclass(frozen=True, eq=False)
+class NextBoard:
+    """What N candidate poses would leave of a function's variance.
+
+    Attributes
+    ----------
+    poses : ndarray, shape (N, 6)
+        Rotation vector (radians) and translation (unit of the squares) from the board to the camera, as OpenCV's.
+    variances : ndarray, shape (N,)
+        Of the function, by the camera, after each.
+    covariance : ndarray, shape (k, k)
+        Of the intrinsics after the best.
+    """
+
+    poses: np.ndarray
+    variances: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def best(self) -> int:
+        """Number of the candidate that leaves least."""
+        return int(self.variances.argmin())
+
+    @property
+    def pose(self) -> np.ndarray:
+        """The best, (6,)."""
+        return self.poses[self.best]
+
+
+def next_board(
+    found: CameraCalibration, boards: Sequence[Board], square_size: float, gradient: np.ndarray
+) -> NextBoard:
+    """The pose, of a grid of those that the camera sees whole, whose photograph lowers a function's variance most.
+
+    Its corners count as measured as the median of those that were, and the camera as it was found.
+
+    Parameters
+    ----------
+    found : CameraCalibration
+        Of ``boards``.
+    gradient : ndarray, shape (k,)
+        Derivatives of the function by ``found.values``.
+
+    Raises
+    ------
+    InvalidInput
+        If the boards determine no camera, or no pose shows a whole board.
+    """
+    if not np.isfinite(found.covariance).all():
+        raise InvalidInput("boards must determine a camera before another is proposed, got ones that do not")
+    shape, poses = boards[0].shape, candidates(found, boards[0].shape, square_size)
+    if not len(poses):
+        raise InvalidInput("board must be seen whole from some pose, got none where it is")
+    sizes = [np.linalg.det(board.covariance[board.measured]) ** 0.25 for board in boards]
+    sigma = np.sqrt(found.dispersion) * float(np.median(np.concatenate(sizes)))
+    known = np.linalg.inv(found.covariance)
+    told = [np.linalg.inv(known + information(found, shape, square_size, pose, sigma)) for pose in poses]
+    variances = np.array([gradient @ each @ gradient for each in told])
+    return NextBoard(poses, variances, told[int(variances.argmin())])
+
+
+def information(
+    found: CameraCalibration, shape: tuple[int, int], square_size: float, pose: np.ndarray, sigma: float
+) -> np.ndarray:
+    """What corners known to ``sigma`` px, of a board at an unknown pose about (6,), tell of the camera, (k, k)."""
+    places, model = _grid(shape, square_size), Model(found.names)
+    view = View(places, np.zeros((len(places), 2)), np.broadcast_to(np.eye(2) / sigma, (len(places), 2, 2)))
+    by_pose, by_camera = view.jacobian(model.camera(found.values), pose)
+    own = np.linalg.qr(by_pose)[0]
+    rest = model.derivatives(by_camera)
+    rest = rest - own @ (own.T @ rest)
+    return rest.T @ rest
+
+
+def candidates(found: CameraCalibration, shape: tuple[int, int], square_size: float) -> np.ndarray:
+    """Poses (N, 6) of boards that are whole in the image, outer squares too."""
+    camera, middle = Model(found.names).camera(found.values), _grid(shape, square_size).mean(0)
+    height, width = found.image_shape
+    outer = _grid((shape[0] + 2, shape[1] + 2), square_size) - [square_size, square_size, 0.0]
+    away, poses = float(np.median([_middle(pose, middle)[2] for pose in found.poses])), []
+    for tilt, towards, roll, nearer, x, y in product(_TILTS, _TOWARDS, _ROLLS, _NEARER, _PLACES, _PLACES):
+        axis = np.radians(tilt) * np.array([np.cos(np.radians(towards)), np.sin(np.radians(towards)), 0.0])
+        rotation = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, np.radians(roll)]))[0]
+        there = nearer * away * np.array([x * width / camera[0][0, 0], y * height / camera[0][1, 1], 1.0])
+        pose = np.concatenate([cv2.Rodrigues(rotation)[0].ravel(), there - rotation @ middle])
+        image = cv2.projectPoints(outer, pose[:3], pose[3:], *camera)[0].reshape(-1, 2)
+        if (image >= _MARGIN).all() and (image <= np.array([width, height]) - 1 - _MARGIN).all():
+            poses.append(pose)
+    return np.array(poses).reshape(-1, 6)
+
+
+def _grid(shape: tuple[int, int], square_size: float) -> np.ndarray:
+    """Corners on the board, (n, 3), row by row."""
+    y, x = np.mgrid[: shape[1], : shape[0]]
+    return square_size * np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], -1).astype(float)
+
+
+def _middle(pose: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Where the board's middle is before the camera, (3,)."""
+    return cv2.Rodrigues(pose[:3])[0] @ middle + pose[3:]

@@ -1,0 +1,97 @@
+"""The board that is proposed next: what it is told to be worth, it is worth in calibrations with it."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+import measure
+import scenes
+from measure.boards.next_pose import candidates, information, next_board
+from scenes import InvalidInput, Picture
+from tests.boards import SMALL, poses, told
+from validation.next_board import propose
+
+SHAPE, SIGMA = SMALL.size[::-1], 0.01
+
+
+def boards(seen, rng):
+    found = []
+    for pose in seen:
+        truth = SMALL.corners(pose)
+        covariance = np.broadcast_to(SIGMA**2 * np.eye(2), (len(truth), 2, 2)).copy()
+        found.append(told(truth + SIGMA * rng.standard_normal(truth.shape), covariance, SMALL.board))
+    return found
+
+
+@pytest.fixture(scope="module")
+def first():
+    """A calibration by four boards."""
+    seen = poses(SMALL, 4, np.random.default_rng(4), 420.0)
+    given = boards(seen, np.random.default_rng(1))
+    return seen, given, measure.calibrate_camera(given, SMALL.square, SHAPE, model="k1,k2,p1,p2")
+
+
+def test_what_a_board_tells_of_a_camera_is_what_a_calibration_with_it_gains(first):
+    """The proposed pose and others, added to the photographs: variances as told, and least of the proposed."""
+    seen, _, found = first
+    for which in ("fx", "k1"):
+        gradient = np.array([float(name == which) for name in found.names])
+        proposed = next_board(found, boards(seen, np.random.default_rng(1)), SMALL.square, gradient)
+        order = np.argsort(proposed.variances)
+        assert len(order) > 50
+        left = []
+        for n in (order[0], order[len(order) // 2], order[-1]):
+            more = boards([*seen, proposed.poses[n]], np.random.default_rng(1))
+            now = measure.calibrate_camera(more, SMALL.square, SHAPE, model="k1,k2,p1,p2")
+            left.append(gradient @ now.covariance @ gradient)
+            assert left[-1] == pytest.approx(
+                proposed.variances[n], rel=0.1
+            )  # at what each calibration finds: 3 % found
+        before = gradient @ found.covariance @ gradient
+        assert left[0] < left[1] < left[2] < 1.05 * before
+        assert left[0] < 0.8 * before
+        # negative control: a board that takes nothing for its own pose would tell more
+        assert proposed.variances[order[0]] > 1.1 / (1 / before + _of_known_pose(found, proposed.pose, gradient))
+
+
+def _of_known_pose(found, pose, gradient):
+    """Information about one number by a board whose pose is known, the others as they are."""
+    places = np.mgrid[: SMALL.board[1], : SMALL.board[0]].reshape(2, -1)[::-1].T
+    points = np.concatenate([SMALL.square * places, np.zeros((len(places), 1))], 1)
+    lens = found.lens
+    matrix = np.array([[lens.fx, 0, lens.cx], [0, lens.fy, lens.cy], [0, 0, 1.0]])
+    by = cv2.projectPoints(points, pose[:3], pose[3:], matrix, np.array(lens.distortion))[1][:, 6:14] / SIGMA
+    return float(gradient @ (by.T @ by) @ gradient)
+
+
+def test_candidates_are_whole_in_the_image(first):
+    found = first[2]
+    for pose in candidates(found, SMALL.board, SMALL.square)[::20]:
+        there = SMALL.corners(pose)
+        assert (there > 4).all()
+        assert (there < np.array(SMALL.size) - 5).all()
+    small = information(found, SMALL.board, SMALL.square, first[0][0], 0.02)
+    np.testing.assert_allclose(4 * small, information(found, SMALL.board, SMALL.square, first[0][0], 0.01))
+
+
+def test_u_of_a_measurand_falls_as_told(first):
+    """U by the calibration with the proposed board against what was told before it; unknown names in a line."""
+    seen, given, found = first
+    scene = scenes.load("task1").with_(uncertainty={"covariance": None})
+    picture = Picture.of(scene, (30, 135), (15, 315))
+    name = scene.quantities[0].name
+    told_ = propose(found, given, SMALL.square, picture, name)
+    assert told_.U_then < told_.U
+    more = boards([*seen, np.array(told_.pose)], np.random.default_rng(1))
+    after = measure.calibrate_camera(more, SMALL.square, SHAPE, model="k1,k2,p1,p2")
+    again = propose(after, more, SMALL.square, picture, name)
+    gained = told_.U - again.U
+    assert gained == pytest.approx(told_.U - told_.U_then, rel=0.2)
+    assert 0 < told_.tilt_deg < 50
+    assert "U of" in told_.text
+    with pytest.raises(InvalidInput, match="--next must be one of"):
+        propose(found, given, SMALL.square, picture, "none")
+    with pytest.raises(InvalidInput, match="must determine a camera before another is proposed"):
+        next_board(replace(found, covariance=np.full_like(found.covariance, np.inf)), given, 1.0, np.zeros(8))
