@@ -6,6 +6,7 @@ import contextlib
 import functools
 import importlib
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = "scenes", "imaging", "planner", "measure", "render", "validation"
 CALLS = 1, 2, 4, 8  # of a function in a case
 _STEPWISE = 0x20 | 0x80 | 0x200  # flags of generators and coroutines, which return many times
+_WITHIN = re.compile(r"\.<(locals|listcomp|setcomp|dictcomp)>")  # the last three are functions until Python 3.12
 _CLEARED = (*(f"{name}." for name in PACKAGES), "tests.")  # beginnings of modules whose caches are
 _LEFT = "tests.regression.stored", "tests.regression.kept", "tests.regression.returns"  # these know no case
 _ONCE = {"render.bsdf._register"}  # kept for as long as the process lives
@@ -69,7 +71,7 @@ class Recorder:
 
     def _list(self, code: CodeType) -> list[Call] | None:
         """Where the calls of a function go; None if it is not the product's, or a part of a function."""
-        name, file = code.co_qualname.replace(".<locals>", ""), code.co_filename
+        name, file = _WITHIN.sub("", code.co_qualname), code.co_filename
         if not file.startswith(self._within) or code.co_flags & _STEPWISE or not code.co_flags & 0x1:
             return None
         if code.co_name.startswith("<") and code.co_name != "<lambda>":
