@@ -59,17 +59,28 @@ def place(picture: Picture, rng: np.random.Generator) -> np.ndarray:
         return parts.drawn(rng, parts.MOST)
     while True:
         there = parts.drawn(rng, parts.MOST * _WHOLE)
-        if is_clear(placed(picture, there)):
+        if is_whole(placed(picture, there)) and is_clear(placed(picture, there)):
             return there
+
+
+def is_whole(picture: Picture) -> bool:
+    """Whether all of the board, its border too, is in the picture."""
+    camera = picture.scene.camera
+    corners = _corners(picture)
+    return bool((corners > 0).all() and (corners < [camera.width - 1, camera.height - 1]).all())
 
 
 def is_clear(picture: Picture) -> bool:
     """Whether one of the board's sides has all of the part more than 40 px beyond it, in the picture."""
-    camera, sensor = picture.scene.camera, np.array(list(picture.sensor))
-    corners, part = (project_ideal(each, sensor, camera) for each in (picture.scene.placement.board.outline,
-                                                                     picture.scene.solid.vertices))  # fmt: skip
-    hull = ConvexHull(corners).equations  # outward
+    scene = picture.scene
+    part = project_ideal(scene.solid.vertices, np.array(list(picture.sensor)), scene.camera)
+    hull = ConvexHull(_corners(picture)).equations  # outward
     return bool(((hull[:, :2] @ part.T + hull[:, 2:]) > 40.0).all(1).any())
+
+
+def _corners(picture: Picture) -> np.ndarray:
+    board, camera = picture.scene.placement.board, picture.scene.camera
+    return project_ideal(board.outline, np.array(list(picture.sensor)), camera)
 
 
 def drawn(picture: Picture, rng: np.random.Generator) -> Picture:
