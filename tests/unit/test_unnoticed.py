@@ -3,6 +3,7 @@
 import json
 import math
 import string
+from dataclasses import fields
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,6 +18,7 @@ from measure.estimators import ellipse
 from measure.estimators.canny import CannyLocator
 from measure.features import rims
 from measure.fitting import fit, sides
+from measure.known_bias import Correction
 from planner.search import lights
 from render import Quality, bsdf, testing, variant
 from scenes import InvalidInput, Material, status
@@ -127,20 +129,7 @@ def test_outputs_may_lie_in_folders_that_do_not_exist_yet_and_in_those_that_do(t
     view = SimpleNamespace(views=[SimpleNamespace(sensor=None, light=None)], combination=SimpleNamespace(used=[[]]))
     several = SimpleNamespace(scene=SimpleNamespace(quantities=[]), sets=[view])
     correction = given(
-        **dict.fromkeys(
-            (
-                "bias",
-                "bias_image",
-                "sources",
-                "sources_image",
-                "covariance",
-                "covariance_image",
-                "renders",
-                "saturated",
-                "adjusted",
-            )
-        ),
-        simulated=(),
+        **dict.fromkeys(each.name for each in fields(Correction)) | {"simulated": ()},
     )
     black = np.zeros((2, 2))
     doors = {
