@@ -12,7 +12,8 @@ import numpy as np
 import planner
 from measure.boards.camera import CameraCalibration
 from measure.boards.chessboard import Board
-from measure.boards.next_pose import next_board
+from measure.boards.next_pose import middle_of, next_board
+from measure.boards.parameters import Model
 from scenes import InvalidInput, Picture
 
 
@@ -79,12 +80,9 @@ def propose(
     gradient = np.array([slopes[each] for each in found.names])
     told, now = next_board(found, boards, square_size, gradient), budget[name]
     freed = gradient @ (found.covariance - told.covariance) @ gradient
-    columns, rows = boards[0].shape
-    turn, middle = cv2.Rodrigues(told.pose[:3])[0], square_size * np.array([columns - 1, rows - 1, 0]) / 2
-    at = turn @ middle + told.pose[3:]
-    lens = found.lens
-    camera = np.array([[lens.fx, 0, lens.cx], [0, lens.fy, lens.cy], [0, 0, 1.0]])
-    image = cv2.projectPoints(middle[None], told.pose[:3], told.pose[3:], camera, np.array(lens.distortion))[0].ravel()
+    at, camera = middle_of(told.pose, boards[0].shape, square_size), Model(found.names).camera(found.values)
+    image = cv2.projectPoints(at[None], np.zeros(3), np.zeros(3), *camera)[0].ravel()
+    normal = cv2.Rodrigues(told.pose[:3])[0][:, 2]
     return Proposal(
         measurand=name,
         unit=now.unit,
@@ -93,6 +91,6 @@ def propose(
         pose=tuple(map(float, told.pose)),
         middle_px=(float(image[0]), float(image[1])),
         distance=float(np.linalg.norm(at)),
-        tilt_deg=float(np.degrees(np.arccos(np.clip(abs(turn[2, 2]), 0.0, 1.0)))),
+        tilt_deg=float(np.degrees(np.arccos(np.clip(abs(normal[2]), 0.0, 1.0)))),
         candidates=len(told.poses),
     )

@@ -17,6 +17,7 @@ from measure.boards.adjustment import View
 from measure.boards.camera import CameraCalibration
 from measure.boards.chessboard import Board
 from measure.boards.parameters import Model
+from scenes.board import numbered
 from scenes.errors import InvalidInput
 
 _PLACES = -0.3, 0.0, 0.3  # of the board's middle, parts of the image's sides beside its middle
@@ -104,7 +105,7 @@ def candidates(found: CameraCalibration, shape: tuple[int, int], square_size: fl
     camera, middle = Model(found.names).camera(found.values), _grid(shape, square_size).mean(0)
     height, width = found.image_shape
     outer = _grid((shape[0] + 2, shape[1] + 2), square_size) - [square_size, square_size, 0.0]
-    away, poses = float(np.median([_middle(pose, middle)[2] for pose in found.poses])), []
+    away, poses = float(np.median([middle_of(pose, shape, square_size)[2] for pose in found.poses])), []
     for tilt, towards, roll, nearer, x, y in product(_TILTS, _TOWARDS, _ROLLS, _NEARER, _PLACES, _PLACES):
         axis = np.radians(tilt) * np.array([np.cos(np.radians(towards)), np.sin(np.radians(towards)), 0.0])
         rotation = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, np.radians(roll)]))[0]
@@ -118,10 +119,9 @@ def candidates(found: CameraCalibration, shape: tuple[int, int], square_size: fl
 
 def _grid(shape: tuple[int, int], square_size: float) -> np.ndarray:
     """Corners on the board, (n, 3), row by row."""
-    y, x = np.mgrid[: shape[1], : shape[0]]
-    return square_size * np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], -1).astype(float)
+    return square_size * np.pad(numbered(*shape), [(0, 0), (0, 1)])
 
 
-def _middle(pose: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """Where the board's middle is before the camera, (3,)."""
-    return cv2.Rodrigues(pose[:3])[0] @ middle + pose[3:]
+def middle_of(pose: np.ndarray, shape: tuple[int, int], square_size: float) -> np.ndarray:
+    """Where the middle of a board at a pose (6,) is before the camera, (3,), unit of the squares."""
+    return cv2.Rodrigues(pose[:3])[0] @ _grid(shape, square_size).mean(0) + pose[3:]
