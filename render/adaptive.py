@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from render.rays import Rays
 
 MISSED = 0.25  # of the brightest: so far is a fine pixel whose one ray missed the tip of a corner from a refined one
 STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
+
+
+def dilated(mask: np.ndarray, size: int) -> np.ndarray:
+    """A mask and what lies in a square of so many pixels, an odd number, around it.
+
+    >>> dilated(np.array([[False, False, True, False]]), 3)
+    array([[False,  True,  True,  True]])
+    """
+    return cv2.dilate(mask.view(np.uint8), np.ones((size, size), np.uint8)).view(bool)
 
 
 def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP, where: np.ndarray | None = None) -> np.ndarray:
@@ -24,11 +33,12 @@ def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP, where: np.ndar
     """
     least = step * max(float(fine.max()), np.finfo(float).tiny)
     if where is None:
-        marked = maximum_filter(fine, 3, mode="nearest") - minimum_filter(fine, 3, mode="nearest") > least
+        around = np.ones((3, 3), np.uint8)
+        marked = cv2.dilate(fine, around) - cv2.erode(fine, around) > least
     else:
         marked = np.zeros(fine.shape, bool)
         marked[where] = _span(fine, where) > least
-    return maximum_filter(marked, 2 * reach + 1) if reach else marked
+    return dilated(marked, 2 * reach + 1) if reach else marked
 
 
 def _span(fine: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -58,7 +68,7 @@ def bent(fine: np.ndarray, step: float = STEP) -> np.ndarray:
 
     ways = (0, 1), (1, 0), (1, 1), (1, -1)
     bend = np.max([np.abs(beside(y, x) + beside(-y, -x) - 2 * fine) for y, x in ways], axis=0)
-    return maximum_filter(bend > step * max(float(fine.max()), np.finfo(float).tiny), 3)
+    return dilated(bend > step * max(float(fine.max()), np.finfo(float).tiny), 3)
 
 
 def refine(scene: Any, rays: Rays, fine: np.ndarray, marked: np.ndarray, samples: int) -> np.ndarray:

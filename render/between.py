@@ -11,10 +11,10 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from scipy.ndimage import maximum_filter
 
 from imaging.geometry.looked_at import looked_at
 from imaging.geometry.projection import facing, project_ideal, viewpoint
+from render.adaptive import dilated
 from scenes import Picture
 
 _UP = 1 - 1e-9  # cosine to the vertical
@@ -49,7 +49,7 @@ def _lent_to(
 ) -> np.ndarray:
     """The same of a mask as bits, so that it can be told whether it is asked for again."""
     marked = np.unpackbits(np.frombuffer(bits, np.uint8), count=math.prod(shape)).reshape(shape).astype(bool)
-    bodies, asked = picture.scene.bodies, maximum_filter(marked, 3)
+    bodies, asked = picture.scene.bodies, dilated(marked, 3)
     pixels = np.argwhere(asked)
     face, _ = looked_at(picture, ((pixels + start + 0.5) / supersample - 0.5)[:, ::-1])
     lent = np.append(~bodies.outer, False)  # the last is what no body is seen in: darkness
@@ -58,19 +58,29 @@ def _lent_to(
         lent[-1] = True
     found = np.zeros(marked.shape, bool)
     found[tuple(pixels.T)] = lent[face]
-    found |= _crossed(picture, lent[:-1], marked.shape, start, supersample)
-    lent = maximum_filter(found, 3) & marked
+    found |= edges_of(picture, lent[:-1], marked.shape, start, supersample)
+    lent = dilated(found, 3) & marked
     lent.flags.writeable = False
     return lent
 
 
-def _crossed(
-    picture: Picture, lent: np.ndarray, shape: tuple[int, int], start: tuple[int, int], supersample: int
+def edges_of(
+    picture: Picture,
+    faces: np.ndarray,
+    shape: tuple[int, int],
+    start: tuple[int, int],
+    supersample: int,
+    *,
+    creases: bool = False,
 ) -> np.ndarray:
-    """Which fine pixels the edges of such faces (F,) that look at the sensor may cross, hidden or not."""
+    """Which fine pixels the edges of some faces (F,) that look at the sensor may cross, hidden or not, a mask.
+
+    With ``creases`` edges between facets of curved surfaces, over which brightness runs on, are left out.
+    """
     bodies, camera, sensor = picture.scene.bodies, picture.scene.camera, np.array(list(picture.sensor))
-    seen = lent & facing(bodies, viewpoint(camera, sensor))
-    edges = [edge.ends for edge in bodies.edges if seen[list(edge.faces)].any()]
+    seen = faces & facing(bodies, viewpoint(camera, sensor))
+    left = ~bodies.plane if creases else np.zeros(len(bodies.faces), bool)
+    edges = [e.ends for e in bodies.edges if seen[list(e.faces)].any() and not left[list(e.faces)].all()]
     found = np.zeros(shape, np.uint8)
     if not edges:
         return found.astype(bool)

@@ -18,9 +18,10 @@ from imaging.geometry.blur import confusion
 from imaging.geometry.projection import depth
 from imaging.light.appearance import is_plain
 from render import variant as variants
-from render.adaptive import bent, crossed, refine
-from render.between import lent_to
+from render.adaptive import bent, crossed, dilated, refine
+from render.between import edges_of, lent_to
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
+from render.even import Even, some_of
 from render.large import Renders, fine_pixels, is_large, whole_pixels
 from render.mosaic import Tiles
 from render.parts import Part
@@ -222,14 +223,17 @@ class _Tracer:
         sight = Sight.of(self.picture, active, self.quality.supersample // divided)
         return Tiles(self.mitsuba, loaded, seen, (crop[0].start, crop[1].start), sight)
 
-    def whole(self, random: bool, count: int) -> np.ndarray:
-        """Image of whole pixels, with or without random rays."""
+    def whole(self, random: bool, count: int, where: np.ndarray | None = None) -> np.ndarray:
+        """Image of whole pixels, with or without random rays; of a mask of them, 0 beside it."""
         active, textures = (self.active, None) if random else (self.sharp, self.textures)
-        loaded = self.load(active, count, textures, self.quality.supersample)
+        loaded, k = self.load(active, count, textures, self.quality.supersample), self.quality.supersample
+        if self.scalar and where is None:
+            return self.rendered(loaded, active, count, k)
+        pixels = np.zeros(tuple(part.stop - part.start for part in self.film(k)[1]))
+        where = np.ones(pixels.shape, bool) if where is None else where
         if self.scalar:
-            return self.rendered(loaded, active, count, self.quality.supersample)
-        pixels = np.zeros(tuple(part.stop - part.start for part in self.film(self.quality.supersample)[1]))
-        return refine(loaded, self.rays, pixels, np.ones(pixels.shape, bool), count)
+            return self._tiles(loaded, active, count, k).rendered(pixels, where, count, (self.quality.seed, 4))
+        return refine(loaded, self.rays, pixels, where, count)
 
     def bounced(self, near: np.ndarray, count: int) -> np.ndarray:
         """What surfaces send to each other: with it less without it, of the same rays; whole pixels."""
@@ -258,11 +262,21 @@ class _Tracer:
             self.random,
             self.quality.everywhere,
             self.bounced if apart and between else None,
-            (lambda marked: lent_to(picture, marked, self.start, k)) if between and plane else None,
+            self._even() if between and plane else None,
             self.quality.alike,
         )
         rays = self.ordinary, self.few, self.many
         return fine_pixels(picture, self.crop, renders, math.ceil(k * defocus(picture)), rays)
+
+    def _even(self) -> Even:
+        """Where light that plane faces send to each other may be seen, in whole pixels, and where it is even."""
+        k, shape = self.quality.supersample, tuple(part.stop - part.start for part in self.crop)
+        first = tuple(part.start for part in self.film(k)[1])
+        every = np.ones(len(self.picture.scene.bodies.normals), bool)
+        return Even(
+            lambda marked: lent_to(self.picture, marked, first, 1),
+            lambda: some_of(dilated(edges_of(self.picture, every, shape, self.start, k, creases=True), 3), k),
+        )
 
     def small(self) -> np.ndarray:
         """Image of which all fine pixels are rendered, and those near edges again."""

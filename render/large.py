@@ -4,7 +4,8 @@ All fine pixels of 5 megapixels are 80 million. Here a first image of whole pixe
 those pixels are divided; if only what is measured is to be seen, pixels that nothing is measured by stay dark. A fine
 pixel that an edge crosses gets all its rays where something is measured by it, and few
 elsewhere. Where a single ray is random (interreflection, an aperture, a light of some size), pixels that nothing is
-measured by get the rays of one fine pixel.
+measured by get the rays of one fine pixel. What plane faces send to each other is even over a pixel that no edge
+crosses: such pixels are rendered as a whole (`render.even`).
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter
 
-from render.adaptive import MISSED, crossed
+from render.adaptive import MISSED, crossed, dilated
+from render.even import Even, Zones, fine_of, with_light_between
 from render.surroundings import near_required
 from scenes import Picture
 
@@ -35,7 +36,8 @@ class Renders:
     Attributes
     ----------
     whole : callable
-        (random, rays) to the image of whole pixels, with or without the effects of random rays.
+        (random, rays) to the image of whole pixels, with or without the effects of random rays; with a mask, 0 beside
+        it.
     again : callable
         (random, image of fine pixels, mask, rays) to that image with marked fine pixels rendered again.
     supersample : int
@@ -46,20 +48,20 @@ class Renders:
     bounced : callable, optional
         (mask of whole pixels, rays) to the image of whole pixels of what surfaces send to each other, 0 elsewhere:
         where that alone is random and is to be added to the direct light.
-    lent_to : callable, optional
-        Mask of fine pixels to those of them that what is random may be seen in; all, if not given.
+    even : Even, optional
+        Where what is random is light that plane faces send to each other.
     alike : bool
         Whether pixels get the same rays wherever an edge crosses them, so that those of two images from one place are
         the same one by one: where they are random, rays go by their order.
     """
 
-    whole: Callable[[bool, int], np.ndarray]
+    whole: Callable[..., np.ndarray]
     again: Callable[[bool, np.ndarray, np.ndarray, int], np.ndarray]
     supersample: int
     random: bool
     everywhere: bool = True
     bounced: Callable[[np.ndarray, int], np.ndarray] | None = None
-    lent_to: Callable[[np.ndarray], np.ndarray] | None = None
+    even: Even | None = None
     alike: bool = False
 
 
@@ -101,35 +103,37 @@ def fine_pixels(
         direct = fine_pixels(picture, crop, replace(renders, random=False, bounced=None), reach, rays)
         moving = near_required(picture, crop, k, _MOVING)
         near = np.ones_like(near) if renders.everywhere else near
-        if renders.lent_to is not None:
-            near = _some(renders.lent_to(_fine(near, k)), k)
-        return direct + _fine(_bounced(renders.bounced, near, moving, few), k)
+        if renders.even is not None:
+            near = renders.even.lent_to(near)
+        return direct + fine_of(_bounced(renders.bounced, near, moving, few), k)
     if renders.everywhere:
         first = renders.whole(False, ordinary)
-        divided, asked = _fine(crossed(first, math.ceil(reach / k)) | near, k), None
+        divided, asked = fine_of(crossed(first, math.ceil(reach / k)) | near, k), None
     else:
-        first = None
-        divided, asked = _fine(near, k), _fine(~maximum_filter(~near, 3), k)  # beside what is dark there is a step
-    fine = np.zeros(divided.shape, np.float32) if first is None else _fine(first, k)
-    fine = renders.again(False, fine, divided, ordinary)
-    marked, near = crossed(fine, reach, where=asked) & divided, _fine(near, k)
-    lent = near if renders.lent_to is None or not renders.random else renders.lent_to(near)
-    if renders.random and renders.alike and not renders.everywhere:
-        return renders.again(True, fine, near & lent, max(few, many))
-    if renders.random:
-        fine = _fine(renders.whole(True, few), k) if renders.everywhere else fine
-        even, moving = near & ~marked, True
-        if not renders.everywhere:  # of fine pixels the direct light is known
-            even = even & lent
+        first = np.zeros(near.shape)
+        divided, asked = fine_of(near, k), fine_of(~dilated(~near, 3), k)  # beside what is dark there is a step
+    fine = renders.again(False, fine_of(first, k), divided, ordinary)
+    marked, close, lent = crossed(fine, reach, where=asked) & divided, fine_of(near, k), True
+    if renders.random and renders.even is not None:
+        seen = renders.even.lent_to(np.ones_like(near) if renders.everywhere else near)
+        lent = fine_of(seen, k)
+        if renders.alike and not renders.everywhere:
+            return renders.again(True, fine, close & lent, max(few, many))
+        moving = near_required(picture, crop, k, _MOVING)
+        fine = with_light_between(renders, renders.even, first, fine, Zones(seen, near, moving), marked, few)
+    elif renders.random and renders.alike and not renders.everywhere:
+        return renders.again(True, fine, close, max(few, many))
+    elif renders.random:
+        fine = fine_of(renders.whole(True, few), k) if renders.everywhere else fine
+        plain, moving = close & ~marked, True
         if is_large(crop, k, random=True):  # else few rays at all would tell the variances badly
-            moving = _fine(near_required(picture, crop, k, _MOVING), k)
-        fine = _with_random(renders, fine, even & moving, even & ~np.asarray(moving), few)
-    if renders.everywhere:
-        fine = renders.again(renders.random, fine, marked & ~near, min(many, _BESIDE))
-    direct = marked & near & ~lent
-    fine = renders.again(False, fine, direct, many) if direct.any() else fine
-    fine = renders.again(renders.random, fine, marked & lent, many)
-    beside = near & ~marked & maximum_filter(marked, 3)  # elsewhere it is noise
+            moving = fine_of(near_required(picture, crop, k, _MOVING), k)
+        fine = _with_random(renders, fine, plain & moving, plain & ~np.asarray(moving), few)
+    for where, count in ((marked & ~close, min(many, _BESIDE)), (marked & close, many)):
+        for random in sorted({False, renders.random}):
+            some = where & lent if random else where & ~np.asarray(lent & renders.random)
+            fine = renders.again(random, fine, some, count) if some.any() else fine
+    beside = close & ~marked & dilated(marked, 3)  # elsewhere it is noise
     missed = crossed(fine, step=MISSED, where=beside)
     return renders.again(renders.random, fine, missed, many) if missed.any() else fine
 
@@ -139,7 +143,7 @@ def _bounced(
 ) -> np.ndarray:
     """What surfaces send to each other, image of whole pixels: ``rays`` where there is any and it moves an edge."""
     light = made(near, _PILOT)
-    lit = maximum_filter(light > 0, 2 * _AROUND + 1) & near & moving
+    lit = dilated(light > 0, 2 * _AROUND + 1) & near & moving
     return np.where(lit, made(lit, rays), light)
 
 
@@ -147,14 +151,3 @@ def _with_random(renders: Renders, fine: np.ndarray, moving: np.ndarray, still: 
     """The image with fine pixels that no edge crosses; fewer rays of those whose noise moves no edge."""
     fine = renders.again(True, fine, moving, rays)
     return renders.again(True, fine, still, max(math.isqrt(rays) // _FEWER, 1) ** 2) if still.any() else fine
-
-
-def _fine(pixels: np.ndarray, supersample: int) -> np.ndarray:
-    kind = bool if pixels.dtype == bool else np.float32  # half the memory
-    return pixels.astype(kind).repeat(supersample, 0).repeat(supersample, 1)
-
-
-def _some(fine: np.ndarray, supersample: int) -> np.ndarray:
-    """Whole pixels one of whose fine ones is marked."""
-    height, width = (size // supersample for size in fine.shape)
-    return fine.reshape(height, supersample, width, supersample).any((1, 3))

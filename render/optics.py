@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.interpolate import BarycentricInterpolator
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import map_coordinates
 
 from imaging.geometry.blur import blur_in_focus, drift
 from imaging.geometry.lens import undistorted
@@ -131,4 +132,7 @@ def _places(shape: tuple[int, ...], start: tuple[int, int], supersample: int) ->
 
 
 def _blurred(fine: np.ndarray, sigma: float) -> np.ndarray:
-    return gaussian_filter(fine, sigma, mode="nearest", truncate=6) if sigma > 0 else fine
+    if not sigma > 0:
+        return fine
+    kernel = cv2.getGaussianKernel(2 * round(_FAR * sigma) + 1, sigma)
+    return cv2.sepFilter2D(fine, -1, kernel, kernel, borderType=cv2.BORDER_REPLICATE)

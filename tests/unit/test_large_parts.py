@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from render import large
+from render.even import Even
 from render.large import Renders, fine_pixels, is_large
 
 K, SIZE, RAYS = 2, (40, 50), (4, 16, 256)
@@ -86,8 +87,8 @@ def test_what_nothing_is_measured_by_stays_dark_and_has_no_edge_at_its_border(mo
     """Few rays up to the border, all at an edge within, random ones only where others' light may be seen."""
     truth = np.full((SIZE[0] * K, SIZE[1] * K), 20.0)
     truth[:, 31:] = 50.0
-    near, lent = np.zeros(SIZE, bool), np.zeros(truth.shape, bool)
-    near[:, 8:24], lent[:, 36:] = True, True
+    near, lent = np.zeros(SIZE, bool), np.zeros(SIZE, bool)
+    near[:, 8:24], lent[:, 18:] = True, True
     monkeypatch.setattr(large, "near_required", lambda *_: near)
     counts = {kind: np.zeros(truth.shape, int) for kind in (False, True)}
 
@@ -95,10 +96,46 @@ def test_what_nothing_is_measured_by_stays_dark_and_has_no_edge_at_its_border(mo
         counts[is_random][marked] = rays
         return np.where(marked, truth, fine)
 
-    renders = Renders(None, again, K, True, False, lent_to=lambda marked: marked & lent)
+    def whole(is_random, rays, where):
+        assert is_random
+        counts[True][where.repeat(K, 0).repeat(K, 1)] = rays
+        return np.where(where, truth.reshape(SIZE[0], K, SIZE[1], K).mean((1, 3)), 0.0)
+
+    crossed = np.zeros(SIZE, bool)
+    crossed[:, 20] = True
+    even = Even(lambda marked: marked & lent, lambda: crossed)
+    renders = Renders(whole, again, K, True, False, even=even)
     found = fine_pixels(None, tuple(slice(0, size * K) for size in SIZE), renders, 0, RAYS)
     assert found == pytest.approx(np.where(near.repeat(K, 0).repeat(K, 1), truth, 0.0))
     assert (counts[False][:, 30:32] == 256).all(), "an edge of direct light alone"
     assert (counts[False][:, [*range(16, 30), *range(32, 48)]] == 4).all()
-    assert (counts[True][:, 36:48] == 16).all()
+    assert (counts[True][:, [*range(36, 40), *range(42, 48)]] == 36).all(), "whole pixels: 0.75 of 4 x 16, each way"
+    assert (counts[True][:, 40:42] == 16).all(), "fine pixels where an edge may cross"
     assert not counts[True][:, :36].any()
+
+
+def test_where_nothing_is_measured_light_between_faces_is_told_from_some_pixels(monkeypatch):
+    """A light that grows along rows: told by every eighth pixel where no edge crosses, by each pixel where one does."""
+    near, crossed = np.zeros(SIZE, bool), np.zeros(SIZE, bool)
+    near[:, :9], crossed[:, 30] = True, True
+    monkeypatch.setattr(large, "near_required", lambda *_: near)
+    sent = np.tile(np.arange(SIZE[1], dtype=float), (SIZE[0], 1))
+    asked = {}
+
+    def whole(is_random, rays, where=None):
+        if not is_random:
+            return np.full(SIZE, 7.0)
+        asked[rays] = where
+        return np.where(where, 7.0 + sent, 0.0)
+
+    def again(is_random, fine, marked, rays):
+        return np.where(marked, 7.0 + is_random * sent.repeat(K, 0).repeat(K, 1), fine)
+
+    renders = Renders(whole, again, K, True, even=Even(lambda marked: marked, lambda: crossed))
+    found = fine_pixels(None, tuple(slice(0, size * K) for size in SIZE), renders, 0, RAYS)
+    assert found == pytest.approx(7.0 + sent.repeat(K, 0).repeat(K, 1), abs=1e-4)
+    some = asked[64]
+    assert set(np.unique(np.nonzero(some)[0])) == set(range(0, 39, 8))
+    assert set(np.unique(np.nonzero(some)[1])) == {*range(8, 25, 8), *range(32, 49, 8)}
+    assert asked[16][:, 24:32].all()
+    assert not asked[16][:32, 9:24].any()
