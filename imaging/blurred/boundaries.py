@@ -17,8 +17,9 @@ from imaging.geometry.lens import image_centre, recorded
 from imaging.geometry.projection import camera_frame, divisor, edge_points, facing, from_axis, in_space
 from imaging.geometry.visibility import boundaries
 from imaging.geometry.visibility import seen as visible_at
-from imaging.light.appearance import face_signal, is_plain, side_signals, sides_of_one
+from imaging.light.appearance import face_signal, is_plain
 from imaging.light.between import light_between
+from imaging.light.edge_sides import side_signals, sides_of_one
 from imaging.light.illumination import fall
 from imaging.pictures import Pictures
 from scenes import Edge, Solid

@@ -21,7 +21,8 @@ from imaging.geometry.blur import blur_in_focus
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import from_axis, ray_origins, rays
 from imaging.geometry.rays import first_face
-from imaging.light.appearance import behind, has_background, signal
+from imaging.light.appearance import has_background, signal
+from imaging.light.behind import behind
 from imaging.light.illumination import fall
 from imaging.light.revolved import light_around, passes, rings_of
 from imaging.pictures import Pictures

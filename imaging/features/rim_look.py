@@ -18,7 +18,7 @@ from imaging.features.rim_sides import RIM_POINTS, outward_normals
 from imaging.geometry.blur import blur_at
 from imaging.geometry.lens import image_centre, lens_jacobian, recorded
 from imaging.geometry.projection import depth, from_axis
-from imaging.light.appearance import seen_at
+from imaging.light.behind import seen_at
 from imaging.pictures import Pictures
 from scenes import Circle
 

@@ -11,7 +11,9 @@ from imaging.features.locator import edge_blur, reach
 from imaging.geometry.blur import blur_in_focus
 from imaging.geometry.projection import from_axis, jacobian_ideal, project
 from imaging.geometry.rays import first_face
-from imaging.light.appearance import behind, face_signal, of_sides
+from imaging.light.appearance import face_signal
+from imaging.light.behind import behind
+from imaging.light.edge_sides import of_sides
 from imaging.pictures import Pictures
 from scenes import Circle, Edge, Solid
 from scenes.viewpoint import Viewpoint

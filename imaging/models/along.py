@@ -13,8 +13,8 @@ from imaging.geometry.blur import blur_at
 from imaging.geometry.lens import lens_jacobian, recorded
 from imaging.geometry.projection import depth, in_space
 from imaging.geometry.visibility import longest_span
-from imaging.light.appearance import edge_contrast
 from imaging.light.backlight import backlights
+from imaging.light.edge_sides import edge_contrast
 from imaging.models.strong import strong_pieces
 from imaging.pictures import Pictures
 from scenes import Edge

@@ -24,8 +24,9 @@ from imaging.geometry.blur import blur_in_focus, confusion
 from imaging.geometry.lens import lens_jacobian
 from imaging.geometry.lens import recorded as recorded_at
 from imaging.geometry.projection import depth, edge_points
-from imaging.light.appearance import is_plain, side_signals
+from imaging.light.appearance import is_plain
 from imaging.light.between import is_exchanged
+from imaging.light.edge_sides import side_signals
 from imaging.light.sheets import printed
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes, used_trims
 from imaging.models.calibrated import calibrated

@@ -11,7 +11,8 @@ import numpy as np
 
 from imaging.features.projected_edges import image_fractions
 from imaging.geometry.projection import direction, edge_points
-from imaging.light.appearance import is_separable, paper_contrast2, paper_step
+from imaging.light.appearance import is_separable
+from imaging.light.edge_sides import paper_contrast2, paper_step
 from imaging.pictures import Pictures
 
 _BLOCK = 256  # poses at a time, so that their points stay in the processor's cache

@@ -15,7 +15,8 @@ import numpy as np
 from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, reach
 from imaging.features.projected_edges import ProjectedEdges, end_divisors
 from imaging.geometry.projection import edge_points, in_space
-from imaging.light.appearance import is_separable, side_signals
+from imaging.light.appearance import is_separable
+from imaging.light.edge_sides import side_signals
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
 from imaging.sensor import recorded

@@ -20,7 +20,8 @@ from imaging.features.locator import edge_blur
 from imaging.features.measurand import Measurands, measurands, normals
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import edge_points, facing, jacobian_ideal, ray_origins, rays
-from imaging.light.appearance import diffuse_signal, side_signals
+from imaging.light.appearance import diffuse_signal
+from imaging.light.edge_sides import side_signals
 from imaging.light.sheets import Sheet, sheets
 from imaging.models.along import place_nodes, used_trims
 from imaging.pictures import Pictures

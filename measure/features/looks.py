@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imaging.geometry.lens import image_centre
-from imaging.light.appearance import seen_at
+from imaging.light.behind import seen_at
 from imaging.pictures import Pictures
 from imaging.sensor import recorded
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from imaging.features.measurand import Measurands, measurands
 from imaging.geometry.projection import edge_points
-from imaging.light.appearance import side_signals
+from imaging.light.edge_sides import side_signals
 from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.bias import MOST
 from imaging.pictures import Pictures

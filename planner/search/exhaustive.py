@@ -18,7 +18,8 @@ from imaging.features.locator import MIN_USABLE, correlation
 from imaging.features.measurand import Measurands, measurands
 from imaging.features.projected_edges import image_fractions, lines_alone
 from imaging.geometry.projection import facing
-from imaging.light.appearance import edge_distance2, is_separable, of_sides, paper_step, side_strengths
+from imaging.light.appearance import is_separable
+from imaging.light.edge_sides import edge_distance2, of_sides, paper_step, side_strengths
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
 from imaging.models.calibrated import SHORT, line_slope, line_weight, long_edge, point_variance
 from imaging.models.paper import PAPER_KAPPA2, PAPER_POINTS

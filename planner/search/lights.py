@@ -19,7 +19,7 @@ from imaging.features.locator import MIN_CONTRAST
 from imaging.features.measurand import measurands
 from imaging.features.projected_edges import lines_alone
 from imaging.geometry.projection import edge_points
-from imaging.light.appearance import of_sides, side_signals
+from imaging.light.edge_sides import of_sides, side_signals
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
 from imaging.models.calibrated import line_slope, line_weight, long_edge, point_variance
 from imaging.models.strong import ROUGH

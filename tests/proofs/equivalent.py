@@ -37,7 +37,7 @@ EQUIVALENT: dict[str, str] = {
         "a case as far away",
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",
     "imaging/geometry/rays.py: _CHUNK = 400001  # ray-triangle pairs at a time": "how many at a time changes no result",
-    "imaging/light/appearance.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "
+    "imaging/light/edge_sides.py: if scene.noise.gain == -1 and not sides.max(initial=0.0) > "
     "sensor.headroom(scene.noise):": "a shorter way to the same numbers is not taken",
     'render/build.py: "near_clip": 1e-3 / camera.distance,': "nothing stands so near to the sensor",
     "validation/statistics.py: pairs = np.stack([np.asarray(first, float), np.asarray(second, float)], axis=1)":

@@ -12,8 +12,8 @@ import typer
 import scenes
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import frame
-from imaging.light import appearance
-from imaging.light.appearance import seen_by_rays
+from imaging.light import behind
+from imaging.light.behind import seen_by_rays
 from imaging.light.emitters import Emitter
 from imaging.pictures import Pictures
 from render import variant as variants
@@ -67,7 +67,7 @@ def compare(name: str, scene: Scene, places: int, rays: int, rng: np.random.Gene
         found.append([_by_rays(picture, at, rays // 4, seed) for seed in range(4)])
         ways = _ways(picture, at)
         start = np.broadcast_to(pictures.sensor_at, ways.shape)
-        with mock.patch.object(appearance, "light_between", return_value=0.0):  # direct light is compared
+        with mock.patch.object(behind, "light_between", return_value=0.0):  # direct light is compared
             exact.append(float(seen_by_rays(pictures, start, ways).mean()))
         lit = np.array([seen_by_rays(_of_one(pictures, each), start, ways) > 0 for each in pictures.emitters])
         part.append(bool(lit.any() and not lit.all()))

@@ -10,7 +10,7 @@ import render
 import scenes
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import frame
-from imaging.light.appearance import seen_by_rays
+from imaging.light.behind import seen_by_rays
 from imaging.pictures import Pictures
 from render import Quality, fine
 from render.parts import parts

@@ -7,16 +7,9 @@ import planner
 import render
 import scenes
 from imaging.geometry.projection import edge_points
-from imaging.light.appearance import (
-    _on_floor,
-    behind,
-    edge_contrast,
-    floor_signal,
-    paper_contrast2,
-    side_signals,
-    sides_of_one,
-    signal,
-)
+from imaging.light.appearance import signal
+from imaging.light.behind import _on_floor, behind, floor_signal
+from imaging.light.edge_sides import edge_contrast, paper_contrast2, side_signals, sides_of_one
 from imaging.pictures import Pictures
 from scenes import Floor, Noise, Obstacle, Picture
 from tests.oracle import axes

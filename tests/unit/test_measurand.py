@@ -9,7 +9,7 @@ from imaging.features.measurand import measurand, required_edges
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import edge_points, jacobian, project
 from imaging.geometry.visibility import visible_spans
-from imaging.light.appearance import paper_contrast2
+from imaging.light.edge_sides import paper_contrast2
 from imaging.models.paper import paper
 from imaging.pictures import Pictures
 from scenes import InvalidInput

@@ -11,7 +11,7 @@ from imaging.features.locator import correlation, kappa2
 from imaging.features.projected_edges import projected_edges
 from imaging.features.propagation import corner_covariance
 from imaging.geometry.projection import edge_points, project
-from imaging.light.appearance import side_signals
+from imaging.light.edge_sides import side_signals
 from imaging.pictures import Pictures
 from scenes import InvalidInput
 from tests.oracle import axes

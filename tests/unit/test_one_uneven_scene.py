@@ -15,7 +15,7 @@ import scenes
 from imaging.geometry.blur import blur_at
 from imaging.geometry.lens import recorded, undistorted
 from imaging.geometry.projection import edge_points, project
-from imaging.light.appearance import edge_contrast, side_signals
+from imaging.light.edge_sides import edge_contrast, side_signals
 from imaging.pictures import Pictures
 from planner.budgeting.budgets import budget
 from render.fine import defocus

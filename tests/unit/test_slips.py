@@ -24,7 +24,7 @@ from imaging.contours import contour, limb
 from imaging.features.circles import RimImage, calibrated_circle
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import direction, edge_points
-from imaging.light.appearance import edge_contrast, side_signals
+from imaging.light.edge_sides import edge_contrast, side_signals
 from imaging.light.emitters import emitters
 from imaging.light.exchange import _arriving, exchanged
 from imaging.pictures import Pictures

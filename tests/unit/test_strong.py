@@ -10,7 +10,7 @@ import scenes
 from imaging.features.locator import MIN_CONTRAST, edge_blur
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import edge_points
-from imaging.light.appearance import side_signals
+from imaging.light.edge_sides import side_signals
 from imaging.models.along import used_trims
 from imaging.models.strong import strong_piece, strong_pieces
 from imaging.pictures import Pictures

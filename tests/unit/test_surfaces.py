@@ -8,8 +8,9 @@ import planner
 import render
 import scenes
 from imaging.geometry.projection import project
-from imaging.light.appearance import face_signal, is_separable, side_signals, whites
+from imaging.light.appearance import face_signal, is_separable
 from imaging.light.between import light_between
+from imaging.light.edge_sides import side_signals, whites
 from imaging.pictures import Pictures
 from scenes import FaceMaterial, InvalidInput, Material, Picture
 from scenes.load import BUNDLED, from_document

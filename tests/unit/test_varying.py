@@ -7,7 +7,8 @@ import pytest
 
 import planner
 import scenes
-from imaging.light.appearance import analyser_axis, of_sides, polarisation_axis, signal
+from imaging.light.appearance import analyser_axis, polarisation_axis, signal
+from imaging.light.edge_sides import of_sides
 from imaging.light.irradiance import bands
 from imaging.pictures import Pictures
 from planner.design import Choice, exposure_time, own_choice, throughput, with_choice

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from imaging.features.projected_edges import image_fractions, straight
-from imaging.light.appearance import edge_contrast
+from imaging.light.edge_sides import edge_contrast
 from imaging.pictures import Pictures
 from scenes import InvalidInput
 from validation.batch.campaign import Case

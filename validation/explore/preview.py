@@ -14,7 +14,8 @@ from imaging.geometry.blur import blur_in_focus
 from imaging.geometry.lens import image_centre, undistorted
 from imaging.geometry.projection import depth, facing, project, ray_origins, rays
 from imaging.geometry.rays import first_face, has_embree
-from imaging.light.appearance import face_signal, seen_at
+from imaging.light.appearance import face_signal
+from imaging.light.behind import seen_at
 from imaging.pictures import Pictures
 from imaging.sensor import full_scale
 from planner.prediction import glanced

@@ -9,7 +9,7 @@ import planner
 import render
 import scenes
 from imaging.features import rim_look
-from imaging.light import appearance
+from imaging.light import behind
 from imaging.pictures import Pictures
 from measure import calibration
 from measure.boards import adjustment, parameters
@@ -393,8 +393,8 @@ def _floors():
     floor = load("plate on a floor").floor
     points = np.array([[0.0, 0, 5.0], [1.0, 2, floor.height], [3.0, 1, -9.0], [0.0, 0, 2.0], [4.0, 4, 4.0]])
     ways = np.array([[0.1, 0.2, -1.0], [0.3, 0.1, -1.0], [0.0, 0.1, -1.0], [1e6, 3.0, -1.0], [0.2, 0.1, 1.0]])
-    met = [appearance._on_floor(floor, points, ways, np.full(5, t)) for t in (np.inf, 4.0)]
-    ends = [appearance._on_floor(floor, np.array([[half, 0.0, floor.height + 1.0], [0.0, -half, floor.height + 2.0]]),
+    met = [behind._on_floor(floor, points, ways, np.full(5, t)) for t in (np.inf, 4.0)]
+    ends = [behind._on_floor(floor, np.array([[half, 0.0, floor.height + 1.0], [0.0, -half, floor.height + 2.0]]),
                                  np.array([[0.0, 0, -1.0]] * 2), np.full(2, np.inf))[1]
             for half in (floor.half_side * 0.999, floor.half_side, floor.half_side * 1.001)]  # fmt: skip
     return {"met": met, "ends": ends}

@@ -1,0 +1,124 @@
+"""Signals of what is seen along lines of sight: past an edge, at a place of the image, of the floor."""
+
+from __future__ import annotations
+
+from functools import lru_cache, partial
+
+import numpy as np
+
+from imaging.geometry.projection import ray_origins, rays
+from imaging.geometry.rays import Own, first_face, reaches
+from imaging.light.appearance import analyser_axis, face_signal, signal, unit
+from imaging.light.backlight import backlights, backlit
+from imaging.light.between import light_between
+from imaging.pictures import Pictures
+from scenes import Floor, Material
+
+_UP = np.array([0.0, 0.0, 1.0])
+_NEAR = 1e-3  # of the object's size: from the sensor, where a ray begins
+_LIFT = 1e-6  # of the object's size: how far beside an edge the floor behind it is looked at
+
+
+def behind(
+    pictures: Pictures, points: np.ndarray, wanted: np.ndarray, own: Own,
+    outward: np.ndarray | None = None, *, fall_off: bool = True,
+) -> np.ndarray:  # fmt: skip
+    """Signal of what the sensor sees just past points of an edge.
+
+    Parameters
+    ----------
+    points : ndarray, shape (..., n, 3)
+        Scene units.
+    wanted : ndarray of bool, shape (..., n)
+        For which points; the others get 0.
+    own : tuple of int, or ndarray of int, shape (n, k)
+        Faces that meet in the edge.
+    outward : ndarray, shape (3,) or (n, 3), optional
+        Direction away from the body that the edge belongs to.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        0 where the ray meets nothing, or what it meets is dark.
+    """
+    scene, bodies = pictures.scene, pictures.scene.bodies
+    vectors = -pictures.viewpoint.widened().towards(points)
+    face, t = _met(bodies, points, vectors, wanted, own)
+    hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
+    lit = tuple(_where(wanted & (face >= 0), hit, face, e.at, partial(reaches, bodies)) for e in pictures.emitters)
+    found = face_signal(pictures, hit, face, 1, lit, fall_off=fall_off)
+    found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
+    if scene.bright_floor is not None:
+        place, ahead = _on_floor(scene.bright_floor, points, vectors, t)
+        place = place + _LIFT * scene.solid.extent * (0 if outward is None else outward * (1, 1, 0))
+        on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
+        found, t = np.where(ahead, on_floor, found), np.where(ahead, 0.0, t)
+    for which in backlights(scene):
+        shown = backlit(pictures, which, points, vectors, analyser_axis(scene, pictures.sensors))
+        found = np.where(np.isinf(t), found + shown, found)
+    return np.where(wanted, found, 0.0)
+
+
+def seen_at(pictures: Pictures, image: np.ndarray) -> np.ndarray:
+    """Signal of what the sensor of one picture sees at image points (n, 2) from the middle, ideal px, shape (n,)."""
+    return seen_by_rays(
+        pictures, *(make(image, pictures.sensors, pictures.scene.camera) for make in (ray_origins, rays))
+    )
+
+
+def seen_by_rays(pictures: Pictures, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """The same along lines of sight from places (n, 3) on."""
+    start = origins + _NEAR * pictures.scene.solid.extent * unit(vectors)
+    return behind(pictures, start, np.ones(len(vectors), bool), ())
+
+
+def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:
+    """Signal of the floor at places (..., n, 3) upon it, in the bodies' shadows dark; 0 where not wanted."""
+    scene, bodies = pictures.scene, pictures.scene.bodies
+    lift = 1e-7 * bodies.extent * _UP
+
+    def free(points, _, light):
+        blocker, t = first_face(bodies, light, points + lift - light, ())
+        return (blocker < 0) | (t >= 1)
+
+    lit = tuple(_where(wanted, places, np.zeros(places.shape[:-1], int), e.at, free) for e in pictures.emitters)
+    return signal(pictures, places, _UP, 1, lit, material=floor_material(scene.floor), fall_off=fall_off)
+
+
+@lru_cache(maxsize=64)
+def floor_material(floor: Floor) -> Material:
+    """The floor's surface: diffuse."""
+    return Material(diffuse_reflectance=floor.reflectance)
+
+
+def _met(bodies, points, vectors, wanted, own) -> tuple[np.ndarray, np.ndarray]:
+    """First face past the points, -1 for none, and how far along the rays; cast only where anything is wanted."""
+    asked = np.broadcast_to(wanted, np.broadcast_shapes(wanted.shape, vectors.shape[:-1]))
+    asked = asked.any(tuple(i for i, size in enumerate(vectors.shape[:-1]) if size < asked.shape[i]), keepdims=True)
+    face, t = np.full(vectors.shape[:-1], -1), np.full(vectors.shape[:-1], np.inf)
+    asked = np.broadcast_to(asked, face.shape)
+    if isinstance(own, np.ndarray):
+        own = np.broadcast_to(own, (*face.shape, own.shape[-1]))[asked]
+    face[asked], t[asked] = first_face(bodies, np.broadcast_to(points, vectors.shape)[asked], vectors[asked], own)
+    return face, t
+
+
+def _on_floor(floor: Floor, points, vectors, t) -> tuple[np.ndarray, np.ndarray]:
+    """Where the rays meet the floor, and whether they do so before anything else."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (floor.height - points[..., 2]) / vectors[..., 2]
+        place = points + reach[..., None] * vectors
+        ahead = (vectors[..., 2] < 0) & (reach >= -1e-9) & (reach < t)
+        ahead &= (np.abs(place[..., :2]) <= floor.half_side).all(-1)
+    return np.where(ahead[..., None], place, points), ahead
+
+
+def _where(wanted, places, faces, light_at, test) -> np.ndarray:
+    """``test(places, faces, light)`` where wanted, False elsewhere; broadcast over the light's leading shape."""
+    shape = np.broadcast_shapes(wanted.shape, places.shape[:-1], (*light_at.shape[:-1], 1))
+    wanted = np.broadcast_to(wanted, shape)
+    found = np.zeros(shape, bool)
+    parts = (np.broadcast_to(v, (*shape, 3))[wanted] for v in (places, light_at[..., None, :]))
+    place, light = parts
+    found[wanted] = test(place, np.broadcast_to(faces, shape)[wanted], light)
+    return found
