@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from measure.boards.adjustment import Adjusted, adjust, begin
 from measure.boards.chessboard import Board
 from measure.boards.eccentricity import centred
-from measure.boards.parameters import Model, read_model
+from measure.boards.parameters import CameraModel, Model, read_model
 from measure.photo.lens import Intrinsics
 from scenes import status
 from scenes.cameras.covariance import Covariance
@@ -32,6 +32,8 @@ class CameraCalibration:
 
     Attributes
     ----------
+    model : CameraModel
+        What is free, and how it sees.
     names : tuple of str
         The free intrinsics, in OpenCV's order; ``fx`` alone stands for both focal lengths where the model has one.
     values : ndarray, shape (k,)
@@ -45,6 +47,10 @@ class CameraCalibration:
         Rotation vector (radians) and translation (unit of the squares) from each board to the camera, as OpenCV's.
     pose_covariance : ndarray, shape (boards, 6, 6)
         With the uncertainty of the squares' size, and enlarged by ``dispersion``.
+    sags, sag_covariance : ndarray, shape (2,) and (2, 2)
+        How far the board's middle stands out of the plane of its outer corners along columns and along rows, unit of
+        the squares, positive away from the camera: parabolas; 0 where it is taken for flat. Enlarged by
+        ``dispersion``.
     residuals : tuple of ndarray, shape (n, 2) each
         Measured less reprojected corners, px; NaN where there is no corner.
     rms_px : float
@@ -60,6 +66,7 @@ class CameraCalibration:
         the board is not flat), ``ill_conditioned`` (the boards do not determine the focal length to 10 %).
     """
 
+    model: CameraModel
     names: tuple[str, ...]
     values: np.ndarray
     covariance: np.ndarray
@@ -67,6 +74,8 @@ class CameraCalibration:
     image_shape: tuple[int, int]
     poses: np.ndarray
     pose_covariance: np.ndarray
+    sags: np.ndarray
+    sag_covariance: np.ndarray
     residuals: tuple[np.ndarray, ...]
     rms_px: float
     chi_square: float
@@ -86,6 +95,11 @@ class CameraCalibration:
         return self.covariance / np.outer(self.sd, self.sd)
 
     @property
+    def curved(self) -> bool:
+        """Whether the board may be bent."""
+        return bool(self.sag_covariance.any())
+
+    @property
     def for_budget(self) -> Covariance:
         """The covariance as a scene's ``uncertainty.covariance``."""
         even = (self.covariance + self.covariance.T) / 2
@@ -98,6 +112,7 @@ def calibrate_camera(
     image_shape: tuple[int, int],
     model: str = DEFAULT_MODEL,
     square_sd: float = 0.0,
+    curved: bool = False,
 ) -> CameraCalibration:
     """Calibrate a camera from measured chessboards or grids of dots.
 
@@ -118,6 +133,8 @@ def calibrate_camera(
         one focal length, fx = fy. "none" for a pinhole. Centre and focal lengths are always free.
     square_sd : float
         Standard uncertainty of ``square_size``, the same for all squares.
+    curved : bool
+        Whether the board may be bent: how far its middle stands out along columns and along rows is not known, either.
 
     Raises
     ------
@@ -134,10 +151,11 @@ def calibrate_camera(
             f"boards must be at least {FEWEST_BOARDS}, of at least {FEWEST_CORNERS} measured corners each, "
             f"got {enough} such of {len(boards)}"
         )
-    found = adjust(boards, square_size, free, begin(boards, square_size, image_shape, free))
+    found = adjust(boards, square_size, free, begin(boards, square_size, image_shape, free), curved)
     if any(board.radius > 0 for board in boards):
         for _ in range(_CENTRINGS):
-            found = adjust(centred(boards, square_size, free, found.parameters), square_size, free, found.parameters)
+            middles = centred(boards, square_size, free, found.parameters)
+            found = adjust(middles, square_size, free, found.parameters, curved)
     return _calibration(boards, free, image_shape, found, square_sd / square_size)
 
 
@@ -155,7 +173,7 @@ def _check(square_size: Any, square_sd: Any, image_shape: Any) -> None:
 
 def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: float) -> CameraCalibration:
     k = len(free.names)
-    freedom = found.rows - found.covariance.shape[0]
+    freedom = found.rows - round(found.told) if np.isfinite(found.told) else 0
     p_value = float(chdtrc(freedom, found.chi_square)) if freedom > 0 else float("nan")
     dispersion = found.chi_square / freedom if p_value < _FALSE_ALARM else 1.0
     covariance = dispersion * found.covariance[:k, :k]
@@ -170,10 +188,12 @@ def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: fl
     state = status.ILL_CONDITIONED if vague else status.MISFIT if dispersion != 1.0 else status.OK
     all_residuals = np.concatenate(found.residuals)
     return CameraCalibration(
-        names=free.names, values=values, covariance=covariance,
+        model=free, names=free.names, values=values, covariance=covariance,
         lens=_lens(*free.camera(values)),
         image_shape=(int(image_shape[0]), int(image_shape[1])), poses=poses, pose_covariance=np.array(blocks),
-        residuals=found.residuals, rms_px=float(np.sqrt(2 * np.nanmean(all_residuals**2))),
+        sags=found.sags,
+        sag_covariance=dispersion * found.sag_covariance, residuals=found.residuals,
+        rms_px=float(np.sqrt(2 * np.nanmean(all_residuals**2))),
         chi_square=found.chi_square, freedom=freedom, p_value=p_value, dispersion=float(dispersion), status=state,
     )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -11,6 +12,26 @@ from scenes.cameras.covariance import ORDER
 from scenes.errors import InvalidInput
 
 _COEFFICIENTS = ORDER[4:]
+_ORIGIN = np.zeros(3)
+
+
+class CameraModel(Protocol):
+    """How a camera sees points, by some free numbers."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the numbers."""
+        ...
+
+    @property
+    def prior(self) -> np.ndarray:
+        """Rows (p, k): their products with the numbers are normal deviates, as far as anything is known before."""
+        ...
+
+    def seen(self, values: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Images (n, 2), px, of points (n, 3) before the camera; derivatives by the numbers (n, 2, k), by the points
+        (n, 2, 3)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -36,6 +57,18 @@ class Model:
         known.setdefault("fy", known["fx"])
         matrix = np.array([[known["fx"], 0, known["cx"]], [0, known["fy"], known["cy"]], [0, 0, 1.0]])
         return matrix, np.array([known.get(name, 0.0) for name in _COEFFICIENTS])
+
+    @property
+    def prior(self) -> np.ndarray:
+        """Nothing is known before."""
+        return np.zeros((0, len(self.names)))
+
+    def seen(self, values: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `CameraModel` has it, by OpenCV."""
+        image, by = cv2.projectPoints(points[:, None], _ORIGIN, _ORIGIN, *self.camera(values))
+        by = by.reshape(len(points), 2, -1)
+        by_values = self.derivatives(by[..., 6:15].reshape(2 * len(points), -1)).reshape(len(points), 2, -1)
+        return image.reshape(-1, 2), by_values, by[..., 3:6]
 
     def values(self, matrix: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
         """The inverse of `camera`."""

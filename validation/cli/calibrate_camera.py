@@ -50,6 +50,9 @@ class Options:
     model: Annotated[
         str, typer.Option(help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none.")
     ] = "k1,k2,p1,p2,k3"
+    curved: Annotated[
+        bool, typer.Option(help="The board may be bent: how far its middle stands out is unknown, too.")
+    ] = False
     noise: Annotated[
         float | None, typer.Option(help="Standard deviation of the noise, grey levels; else from each image.")
     ] = None
@@ -95,7 +98,9 @@ def calibrate_camera_command(given: Options) -> None:
         seen = read_boards(given.boards, printed, given.noise, shown, size)
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
-    found = measure.calibrate_camera(seen.boards, given.square, seen.image_shape, given.model, given.square_sd)
+    found = measure.calibrate_camera(
+        seen.boards, given.square, seen.image_shape, given.model, given.square_sd, given.curved
+    )
     lines = camera_table.scene_lines(found, scene, beside) if scene is not None else None
     proposal = _proposal(given, found, seen)
     written = _write_files(found, seen, given.output, given.residuals)
@@ -193,7 +198,7 @@ def _show(found, seen, units: str, lines: str | None) -> None:
     shown = console()
     shown.print(camera_table.boards(found, seen, units))
     shown.print(camera_table.parameters(found))
-    shown.print(camera_table.summary(found), highlight=False)
+    shown.print(camera_table.summary(found, units), highlight=False)
     if lines is not None:
         print(f"\n{lines}")
 

@@ -57,8 +57,8 @@ def parameters(found: CameraCalibration) -> Table:
     return table
 
 
-def summary(found: CameraCalibration) -> str:
-    """What the residuals say, and the strongest correlations."""
+def summary(found: CameraCalibration, units: str) -> str:
+    """What the residuals say, how the board is bent, and the strongest correlations."""
     lines = [
         f"{found.status}: reprojection {found.rms_px:.4f} px rms; chi-square {found.chi_square:.1f} for "
         f"{found.freedom} degrees of freedom, p = {found.p_value:.2g} (the chance of so large residuals if board and "
@@ -67,7 +67,13 @@ def summary(found: CameraCalibration) -> str:
     if found.dispersion != 1:
         lines.append(
             f"The corners lie further off than their covariance says: all covariances are multiplied by "
-            f"{found.dispersion:.3g}. Another --model, or a board that is not flat?"
+            f"{found.dispersion:.3g}. Another --model, or a board that is not flat (--curved)?"
+        )
+    if found.curved:
+        (x, y), (dx, dy) = found.sags, np.sqrt(np.diag(found.sag_covariance))
+        lines.append(
+            f"The board's middle stands out by {x:+.4g} +- {dx:.2g} {units} along its columns and {y:+.4g} +- {dy:.2g} "
+            f"{units} along its rows, away from the camera if positive."
         )
     pairs = _strong(found)
     if pairs:
@@ -140,6 +146,8 @@ def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
         "covariance": found.covariance.tolist(),
         "correlation": found.correlation.tolist(),
         **picked(found, "rms_px", "chi_square", "freedom", "p_value", "dispersion"),
+        "sags": found.sags.tolist() if found.curved else None,
+        "sag_sd": np.sqrt(np.diag(found.sag_covariance)).tolist() if found.curved else None,
         "boards": _board_facts(found, seen),
         "left_out": [{"file": str(path), "reason": reason} for path, reason in seen.left_out],
     }
