@@ -69,11 +69,17 @@ def begin(boards: Sequence[Board], square: float, image_shape: tuple[int, int], 
 
 
 def adjust(
-    boards: Sequence[Board], square: float, model: CameraModel, start: np.ndarray, curved: bool = False
+    boards: Sequence[Board],
+    square: float,
+    model: CameraModel,
+    start: np.ndarray,
+    curved: bool = False,
+    sags: np.ndarray | None = None,
 ) -> Adjusted:
     """Least squares of all residuals, whitened by the corners' covariance, from ``start``; with ``curved`` the board's
-    two sags are unknown, too."""
-    problem = _Problem([View.of(board, square) for board in boards], model, curved)
+    two sags are unknown, too, else they are those that are given, or 0."""
+    known = np.zeros(2) if sags is None else sags
+    problem = _Problem([View.of(board, square) for board in boards], model, curved, known)
     k = len(model.names)
     least = _SHORTEST * start[:k][problem.focal]
     with np.errstate(all="ignore"):
@@ -102,6 +108,7 @@ class _Problem:
     views: list[View]
     model: CameraModel
     curved: bool
+    bent: np.ndarray
 
     @property
     def sags(self) -> int:
@@ -118,7 +125,7 @@ class _Problem:
     def split(self, shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Intrinsics and both sags."""
         k = len(self.model.names)
-        return shared[:k], shared[k:] if self.curved else np.zeros(2)
+        return shared[:k], shared[k:] if self.curved else self.bent
 
     def blocks(self, point: Point) -> list[Block]:
         shared, poses = point

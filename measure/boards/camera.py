@@ -13,8 +13,9 @@ from scipy.special import chdtrc
 from measure.boards.adjustment import Adjusted, adjust, begin
 from measure.boards.chessboard import Board
 from measure.boards.eccentricity import centred
-from measure.boards.parameters import CameraModel, Model, read_model
-from measure.photo.lens import Intrinsics
+from measure.boards.parameters import SPLINED, CameraModel, Model, read_model, splined_control
+from measure.boards.splined import SplinedModel, fitted
+from measure.photo.lens import Intrinsics, SplinedIntrinsics
 from scenes import status
 from scenes.cameras.covariance import Covariance
 from scenes.errors import InvalidInput
@@ -40,7 +41,7 @@ class CameraCalibration:
         Of those, px for fx, fy, cx, cy.
     covariance : ndarray, shape (k, k)
         Of those; enlarged by ``dispersion``.
-    lens : Intrinsics
+    lens : Intrinsics or SplinedIntrinsics
         All intrinsics, as `measure.measure_quadrilateral` takes them.
     image_shape : (height, width)
     poses : ndarray, shape (boards, 6)
@@ -70,7 +71,7 @@ class CameraCalibration:
     names: tuple[str, ...]
     values: np.ndarray
     covariance: np.ndarray
-    lens: Intrinsics
+    lens: Intrinsics | SplinedIntrinsics
     image_shape: tuple[int, int]
     poses: np.ndarray
     pose_covariance: np.ndarray
@@ -95,13 +96,26 @@ class CameraCalibration:
         return self.covariance / np.outer(self.sd, self.sd)
 
     @property
+    def is_splined(self) -> bool:
+        """Whether displacements are splines, and ``lens`` a `SplinedIntrinsics`."""
+        return isinstance(self.model, SplinedModel)
+
+    @property
     def curved(self) -> bool:
         """Whether the board may be bent."""
         return bool(self.sag_covariance.any())
 
     @property
     def for_budget(self) -> Covariance:
-        """The covariance as a scene's ``uncertainty.covariance``."""
+        """The covariance as a scene's ``uncertainty.covariance``.
+
+        Raises
+        ------
+        InvalidInput
+            Of a splined lens, whose numbers a scene does not take for uncertain.
+        """
+        if self.is_splined:
+            raise InvalidInput(f"model must be one of coefficients for a covariance that scenes take, got {SPLINED}")
         even = (self.covariance + self.covariance.T) / 2
         return Covariance(names=self.names, matrix=tuple(tuple(map(float, row)) for row in even))
 
@@ -130,7 +144,9 @@ def calibrate_camera(
     image_shape : (height, width)
     model : str
         Free distortion coefficients with commas between, of k1, k2, p1, p2, k3; the others are 0. ``f`` among them:
-        one focal length, fx = fy. "none" for a pinhole. Centre and focal lengths are always free.
+        one focal length, fx = fy. "none" for a pinhole. Centre and focal lengths are always free. "splined", or
+        "splined:12x8" with that many control points, for bicubic splines (`scenes.cameras.Splined`): ``values`` are
+        then the focal length and combinations of control points, and the axis is in the image's middle.
     square_sd : float
         Standard uncertainty of ``square_size``, the same for all squares.
     curved : bool
@@ -141,7 +157,8 @@ def calibrate_camera(
     InvalidInput
         If an argument is bad, or there are too few boards, or they determine no camera.
     """
-    free = read_model(model)
+    control = splined_control(model)
+    free: CameraModel = read_model("none" if control else model)
     _check(square_size, square_sd, image_shape)
     if not isinstance(boards, list | tuple) or not all(isinstance(board, Board) for board in boards):
         raise InvalidInput("boards must be a list of Boards, got something else")
@@ -151,7 +168,11 @@ def calibrate_camera(
             f"boards must be at least {FEWEST_BOARDS}, of at least {FEWEST_CORNERS} measured corners each, "
             f"got {enough} such of {len(boards)}"
         )
-    found = adjust(boards, square_size, free, begin(boards, square_size, image_shape, free), curved)
+    if control:
+        free, start = fitted(boards, square_size, image_shape, control)
+    else:
+        start = begin(boards, square_size, image_shape, read_model(model))
+    found = adjust(boards, square_size, free, start, curved)
     if any(board.radius > 0 for board in boards):
         for _ in range(_CENTRINGS):
             middles = centred(boards, square_size, free, found.parameters)
@@ -171,7 +192,7 @@ def _check(square_size: Any, square_sd: Any, image_shape: Any) -> None:
         raise InvalidInput(f"image_shape must be (height, width) in px, got {image_shape!r}")
 
 
-def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: float) -> CameraCalibration:
+def _calibration(boards, free: CameraModel, image_shape, found: Adjusted, scale_sd: float) -> CameraCalibration:
     k = len(free.names)
     freedom = found.rows - round(found.told) if np.isfinite(found.told) else 0
     p_value = float(chdtrc(freedom, found.chi_square)) if freedom > 0 else float("nan")
@@ -189,13 +210,20 @@ def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: fl
     all_residuals = np.concatenate(found.residuals)
     return CameraCalibration(
         model=free, names=free.names, values=values, covariance=covariance,
-        lens=_lens(*free.camera(values)),
+        lens=_seen_by(free, values),
         image_shape=(int(image_shape[0]), int(image_shape[1])), poses=poses, pose_covariance=np.array(blocks),
         sags=found.sags,
         sag_covariance=dispersion * found.sag_covariance, residuals=found.residuals,
         rms_px=float(np.sqrt(2 * np.nanmean(all_residuals**2))),
         chi_square=found.chi_square, freedom=freedom, p_value=p_value, dispersion=float(dispersion), status=state,
     )  # fmt: skip
+
+
+def _seen_by(free: CameraModel, values: np.ndarray) -> Intrinsics | SplinedIntrinsics:
+    if isinstance(free, SplinedModel):
+        return SplinedIntrinsics(fx=values[0], cx=free.middle[0], cy=free.middle[1], spline=free.lens(values))
+    assert isinstance(free, Model)
+    return _lens(*free.camera(values))
 
 
 def _lens(matrix: np.ndarray, coefficients: np.ndarray) -> Intrinsics:

@@ -94,7 +94,7 @@ def _step(here: Sequence[Block], prior: np.ndarray, shared: np.ndarray, damping:
         normal += block.shared.T @ rows
         right += rows.T @ block.residual
     even = (normal + normal.T) / (2 * np.outer(size, size))
-    step = -np.linalg.lstsq(even, right / size, rcond=1e-15)[0] / size
+    step = -np.linalg.lstsq(even, right / size, rcond=1e-15)[0] / size if len(size) else np.zeros(0)
     poses = np.array([block.pose_step(step, hold) for block, hold in zip(here, damped, strict=True)])
     gain = (prior @ shared) @ (prior @ shared) - (prior @ (shared + step)) @ (prior @ (shared + step))
     for block, pose in zip(here, poses, strict=True):
@@ -113,9 +113,9 @@ def covariance(here: Sequence[Block], prior: np.ndarray) -> np.ndarray:
     if not all((each > 0).all() for each in (size, *own)):
         return nothing
     rows = [block.without_pose(np.zeros(6))[0] for block in here]
-    triangle = np.linalg.qr(np.concatenate([*rows, prior]) / size, mode="r")
+    triangle = np.linalg.qr(np.concatenate([*rows, prior]) / size, mode="r") if s else np.zeros((0, 0))
     posed = [np.linalg.qr(block.own / each) for block, each in zip(here, own, strict=True)]
-    if max(map(np.linalg.cond, (triangle, *(each[1] for each in posed)))) > _WORST:
+    if max(np.linalg.cond(each) for each in (triangle, *(upper for _, upper in posed)) if each.size) > _WORST:
         return nothing
     root = np.linalg.inv(triangle) / size[:, None]
     roots = [root]  # of the unknowns by the shared residuals: a pose follows what all share

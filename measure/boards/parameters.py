@@ -13,6 +13,8 @@ from scenes.errors import InvalidInput
 
 _COEFFICIENTS = ORDER[4:]
 _ORIGIN = np.zeros(3)
+SPLINED, CONTROL = "splined", (8, 6)  # control points, columns and rows
+_FEWEST, _MOST = 4, 40
 
 
 class CameraModel(Protocol):
@@ -109,6 +111,37 @@ def read_model(text: str) -> Model:
     given = text if isinstance(text, str) else "?"
     names = [] if given == "none" else [part.strip() for part in given.split(",")]
     if len(set(names)) < len(names) or not set(names) <= {"f", *_COEFFICIENTS}:
-        raise InvalidInput(f"model must be none, or some of f, {', '.join(_COEFFICIENTS)}, got {str(text)[:80]!r}")
+        raise InvalidInput(
+            f"model must be none, splined, or some of f, {', '.join(_COEFFICIENTS)}, got {str(text)[:80]!r}"
+        )
     always = ("fx", "cx", "cy") if "f" in names else ("fx", "fy", "cx", "cy")
     return Model((*always, *(name for name in _COEFFICIENTS if name in names)))
+
+
+def splined_control(text: str) -> tuple[int, int] | None:
+    """Control points, columns and rows, of a model that is splined; None of another.
+
+    Raises
+    ------
+    InvalidInput
+        If there are no such splines.
+
+    Examples
+    --------
+    >>> splined_control("splined"), splined_control("splined:12x8"), splined_control("k1")
+    ((8, 6), (12, 8), None)
+    """
+    name, _, size = text.partition(":") if isinstance(text, str) else ("", "", "")
+    if name.strip() != SPLINED:
+        return None
+    if not size:
+        return CONTROL
+    try:
+        columns, rows = (int(part) for part in size.lower().split("x"))
+    except ValueError:
+        columns = rows = 0
+    if not (_FEWEST <= columns <= _MOST and _FEWEST <= rows <= _MOST):
+        raise InvalidInput(
+            f"model must be {SPLINED}:COLUMNSxROWS, {_FEWEST} to {_MOST} control points each, got {text[:80]!r}"
+        )
+    return columns, rows
