@@ -41,15 +41,15 @@ class Difference:
         Where the first camera sees them, px: a grid over the image, less what one of the cameras shows nowhere.
     away : ndarray, shape (n, 2)
         Where the second sees them less that, px, after the best rotation.
-    told : ndarray, shape (n,)
-        Root of the variance of that distance, by both covariances, as of independent calibrations, px.
+    covariance : ndarray, shape (2 n, 2 n)
+        Of ``away``, place by place, by both covariances, as of independent calibrations, px^2.
     wanted : int
         Places of the whole grid.
     """
 
     places: np.ndarray
     away: np.ndarray
-    told: np.ndarray
+    covariance: np.ndarray
     wanted: int
 
     @property
@@ -60,7 +60,7 @@ class Difference:
     @property
     def told_px(self) -> float:
         """The same as it should be."""
-        return float(np.sqrt((self.told**2).mean()))
+        return float(np.sqrt(2 * np.diag(self.covariance).mean()))
 
 
 def projection_difference(first: Calibrated, second: Calibrated, margin: float = _MARGIN) -> Difference:
@@ -81,8 +81,7 @@ def projection_difference(first: Calibrated, second: Calibrated, margin: float =
     rows = np.concatenate([_spread(by_first, first.covariance), _spread(by_second[both], second.covariance)], 1)
     taken = np.linalg.qr(_by_turn(there[both], by_points[both]))[0]
     rows = rows - taken @ (taken.T @ rows)
-    told = np.sqrt((rows**2).sum(1).reshape(-1, 2).sum(1))
-    return Difference(places[seen][both], image[both] - places[seen][both], told, len(places))
+    return Difference(places[seen][both], image[both] - places[seen][both], rows @ rows.T, len(places))
 
 
 def rays_of(camera: Calibrated, places: np.ndarray) -> np.ndarray:

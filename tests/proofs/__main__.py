@@ -31,6 +31,7 @@ from tests.proofs.mixed import mixed
 from tests.proofs.msa import msa
 from tests.proofs.pairs import pairs
 from tests.proofs.parts import parts
+from tests.proofs.peer import peer
 from tests.proofs.photographs import photographs
 from tests.proofs.placements import placements
 from tests.proofs.processed import processed
@@ -71,6 +72,7 @@ app.command()(mixed)
 app.command()(msa)
 app.command()(pairs)
 app.command()(parts)
+app.command()(peer)
 app.command()(photographs)
 app.command()(placements)
 app.command()(processed)

@@ -95,7 +95,11 @@ def summary(found: CameraCalibration, units: str) -> str:
 def comparison(compared: Compared) -> str:
     """What boards that were left out say of two models."""
     (plain, other), (first, second) = compared.models, compared.rms_px
-    why = "they are seen better so, beyond chance" if compared.proposed == other else "no better beyond chance by the other"
+    why = (
+        "they are seen better so, beyond chance"
+        if compared.proposed == other
+        else "no better beyond chance by the other"
+    )
     return (
         f"boards that are left out in turn: {first:.4f} px rms by {plain}, {second:.4f} px by {other}, "
         f"p = {compared.p_value:.2g}. Proposed: {compared.proposed} ({why})."
