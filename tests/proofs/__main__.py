@@ -38,6 +38,7 @@ from tests.proofs.processed import processed
 from tests.proofs.rate import rate
 from tests.proofs.real_noise import real_noise
 from tests.proofs.shots import shots
+from tests.proofs.splined import splined
 from tests.proofs.stations import stations
 from tests.proofs.telecentric import telecentric
 from tests.proofs.uneven import uneven
@@ -82,6 +83,7 @@ app.command()(uneven)
 app.command()(usable)
 app.command()(varied)
 app.command()(shots)
+app.command()(splined)
 app.command()(stations)
 app.command()(telecentric)
 
