@@ -244,8 +244,8 @@ def _stored(theirs: Peer) -> tuple[Line | None, bool]:
     """What the stored solution leaves; by its own model, where that can be adjusted here, and whether it stays."""
     corners = sum(len(board.corners) for board in theirs.boards)
     print(
-        f"{theirs.name}: {len(theirs.boards)} boards, {corners} corners, {theirs.marked} marked as outliers; the stored "
-        f"solution leaves {theirs.stored:.4f} px rms", flush=True,
+        f"{theirs.name}: {len(theirs.boards)} boards, {corners} corners, {theirs.marked} marked as outliers; the "
+        f"stored solution leaves {theirs.stored:.4f} px rms", flush=True,
     )  # fmt: skip
     if not isinstance(theirs.model, Rational):
         return None, True
