@@ -8,9 +8,11 @@ from measure.best import best_estimator
 from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.charuco import charuco
 from measure.boards.chessboard import Board, chessboard
+from measure.boards.cross_validation import Compared, compare_models
 from measure.boards.dots import dot_grid
 from measure.boards.marker_grid import marker_grid
 from measure.boards.next_pose import NextBoard, next_board
+from measure.boards.projections import Difference, projection_difference
 from measure.bounds import bound
 from measure.bundle import Bundled, bundle
 from measure.correction import Images, correction
@@ -25,7 +27,7 @@ from measure.known_bias import Correction
 from measure.measurands import Measurements, corrected, measure, measure_by
 from measure.measurement import Measurement, distance, distances
 from measure.photo.blur_field import BlurredSides, FittedField, blurred_sides, fitted_field
-from measure.photo.lens import Intrinsics, load_lens
+from measure.photo.lens import Intrinsics, SplinedIntrinsics, load_lens
 from measure.photo.mtf import EdgeResponse, mtf
 from measure.photo.noise_curve import NoiseCurve, noise_curve
 from measure.photo.photograph import MeasuredShape, Shapes, photograph
@@ -42,7 +44,9 @@ __all__ = [
     "Bundled",
     "CameraCalibration",
     "Candidate",
+    "Compared",
     "Correction",
+    "Difference",
     "EdgeResponse",
     "Ellipse",
     "EstimatorKind",
@@ -63,6 +67,7 @@ __all__ = [
     "PropagatedValues",
     "Quadrilateral",
     "Shapes",
+    "SplinedIntrinsics",
     "best_estimator",
     "blurred_sides",
     "bound",
@@ -70,6 +75,7 @@ __all__ = [
     "calibrate_camera",
     "charuco",
     "chessboard",
+    "compare_models",
     "corrected",
     "correction",
     "distance",
@@ -91,6 +97,7 @@ __all__ = [
     "noise_curve",
     "photograph",
     "photon_transfer",
+    "projection_difference",
     "propagate",
     "region_of_interest",
 ]

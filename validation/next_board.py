@@ -13,7 +13,6 @@ import planner
 from measure.boards.camera import CameraCalibration
 from measure.boards.chessboard import Board
 from measure.boards.next_pose import middle_of, next_board
-from measure.boards.parameters import Model
 from scenes import InvalidInput, Picture
 
 
@@ -80,8 +79,8 @@ def propose(
     gradient = np.array([slopes[each] for each in found.names])
     told, now = next_board(found, boards, square_size, gradient), budget[name]
     freed = gradient @ (found.covariance - told.covariance) @ gradient
-    at, camera = middle_of(told.pose, boards[0].shape, square_size), Model(found.names).camera(found.values)
-    image = cv2.projectPoints(at[None], np.zeros(3), np.zeros(3), *camera)[0].ravel()
+    at = middle_of(told.pose, boards[0].shape, square_size)
+    image = found.model.seen(found.values, at[None])[0][0]
     normal = cv2.Rodrigues(told.pose[:3])[0][:, 2]
     return Proposal(
         measurand=name,

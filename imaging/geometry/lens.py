@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenes import Camera
+from scenes.cameras.lens_model import LensModel
 
 _STEPS = 30
 _SETTLED = 1e-12  # focal lengths
@@ -31,8 +32,12 @@ def undistorted(seen: np.ndarray, camera: Camera) -> np.ndarray:
     """Ideal coordinates of recorded image points (..., 2), px, by Newton's method; NaN where nothing is recorded."""
     if not camera.lens.bends:
         return seen
-    centre, lens = image_centre(camera), camera.lens
-    wanted = (np.asarray(seen, float) - centre) / camera.focal_px
+    centre = image_centre(camera)
+    return centre + camera.focal_px * unbent((np.asarray(seen, float) - centre) / camera.focal_px, camera.lens)
+
+
+def unbent(wanted: np.ndarray, lens: LensModel) -> np.ndarray:
+    """Where a pinhole sees what a lens records at places (..., 2), both in focal lengths, by Newton's method."""
     found = wanted.copy()
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
@@ -40,8 +45,8 @@ def undistorted(seen: np.ndarray, camera: Camera) -> np.ndarray:
             found = found - step
             if not np.nanmax(np.abs(step), initial=0.0) > _SETTLED:
                 break
-        missed = np.abs(lens.bent(found) - wanted).max(-1) > 1e-9
-    return centre + camera.focal_px * np.where(missed[..., None], np.nan, found)
+        missed = ~(np.abs(lens.bent(found) - wanted).max(-1) <= 1e-9)
+    return np.where(missed[..., None], np.nan, found)
 
 
 def lens_jacobian(ideal: np.ndarray, camera: Camera) -> np.ndarray:

@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 
 from measure.boards.chessboard import Board
-from measure.boards.parameters import Model
+from measure.boards.elimination import Block, Point, covariance, minimised
+from measure.boards.parameters import CameraModel, Model
+from measure.boards.view import View, on_board
 from scenes.errors import InvalidInput
 
-_TRIES = 200
 _LEAST = 0.05  # of the image's longer side: a focal length that no lens has
 _HELD = cv2.CALIB_USE_INTRINSIC_GUESS + cv2.CALIB_FIX_FOCAL_LENGTH + cv2.CALIB_FIX_PRINCIPAL_POINT
 _SHORTEST = 1e-2  # of the focal length where the search begins: boards that tell none let it go anywhere
@@ -22,15 +23,20 @@ _SHORTEST = 1e-2  # of the focal length where the search begins: boards that tel
 class Adjusted:
     """The least whitened residuals.
 
-    ``parameters`` are the free intrinsics and six numbers of each pose, ``covariance`` is theirs; ``rows`` counts
-    residuals, ``residuals`` are those of each board's corners in px, (n, 2), NaN where there is none.
+    ``parameters`` are the free intrinsics and six numbers of each pose, ``covariance`` is theirs; ``sags`` are how far
+    the board's middle stands out, along columns and rows, with the covariance ``sag_covariance``; both 0 of a flat
+    board. ``rows`` counts residuals, ``told`` the unknowns that they tell (what a prior tells is none),
+    ``residuals`` are those of each board's corners in px, (n, 2), NaN where there is none.
     """
 
     parameters: np.ndarray
     covariance: np.ndarray
     chi_square: float
     rows: int
+    told: float
     residuals: tuple[np.ndarray, ...]
+    sags: np.ndarray
+    sag_covariance: np.ndarray
 
 
 def begin(boards: Sequence[Board], square: float, image_shape: tuple[int, int], model: Model) -> np.ndarray:
@@ -44,7 +50,7 @@ def begin(boards: Sequence[Board], square: float, image_shape: tuple[int, int], 
         If it finds none.
     """
     there = [board.measured for board in boards]
-    objects = [_object(board, square)[good].astype(np.float32) for board, good in zip(boards, there, strict=True)]
+    objects = [on_board(board, square)[good].astype(np.float32) for board, good in zip(boards, there, strict=True)]
     corners = [board.corners[good].astype(np.float32) for board, good in zip(boards, there, strict=True)]
     size = image_shape[::-1]
     try:
@@ -62,87 +68,91 @@ def begin(boards: Sequence[Board], square: float, image_shape: tuple[int, int], 
     return found
 
 
-def adjust(boards: Sequence[Board], square: float, model: Model, start: np.ndarray) -> Adjusted:
-    """Least squares of all residuals, whitened by the corners' covariance, from ``start``."""
-    views = [View.of(board, square) for board in boards]
+def adjust(
+    boards: Sequence[Board],
+    square: float,
+    model: CameraModel,
+    start: np.ndarray,
+    curved: bool = False,
+    sags: np.ndarray | None = None,
+) -> Adjusted:
+    """Least squares of all residuals, whitened by the corners' covariance, from ``start``; with ``curved`` the board's
+    two sags are unknown, too, else they are those that are given, or 0."""
+    known = np.zeros(2) if sags is None else sags
+    problem = _Problem([View.of(board, square) for board in boards], model, curved, known)
     k = len(model.names)
-
-    def residual(parameters: np.ndarray) -> np.ndarray:
-        camera = model.camera(parameters[:k])
-        poses = parameters[k:].reshape(-1, 6)
-        return np.concatenate([view.residual(camera, pose) for view, pose in zip(views, poses, strict=True)])
-
-    def jacobian(parameters: np.ndarray) -> np.ndarray:
-        camera, poses, rows = model.camera(parameters[:k]), parameters[k:].reshape(-1, 6), []
-        for i, (view, pose) in enumerate(zip(views, poses, strict=True)):
-            by_pose, by_camera = view.jacobian(camera, pose)
-            row = np.zeros((len(by_pose), parameters.size))
-            row[:, :k], row[:, k + 6 * i : k + 6 * i + 6] = model.derivatives(by_camera), by_pose
-            rows.append(row)
-        return np.concatenate(rows)
-
-    from scipy.optimize import least_squares  # slow to load, and rarely needed
-
-    least = np.full(start.size, -np.inf)
-    focal = [i for i, name in enumerate(model.names) if name in ("fx", "fy")]
-    least[focal] = _SHORTEST * start[focal]
+    least = _SHORTEST * start[:k][problem.focal]
     with np.errstate(all="ignore"):
-        found = least_squares(
-            residual, start, jacobian, (least, np.inf), "trf", x_scale="jac",
-            xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=_TRIES,
+        shared, poses = minimised(
+            problem.blocks, problem.cost, problem.prior,
+            (np.concatenate([start[:k], np.zeros(problem.sags)]), start[k:].reshape(-1, 6)),
+            lambda shared: bool((shared[problem.focal] > least).all()),
         )  # fmt: skip
-    camera, poses = model.camera(found.x[:k]), found.x[k:].reshape(-1, 6)
-    left = tuple(view.left(camera, pose, board) for view, pose, board in zip(views, poses, boards, strict=True))
-    return Adjusted(found.x, _inverse(found.jac), float(2 * found.cost), found.fun.size, left)
-
-
-def _inverse(jacobian: np.ndarray) -> np.ndarray:
-    """Inverse normal matrix; infinite where the residuals determine nothing."""
-    size = np.linalg.norm(jacobian, axis=0)
-    if not (size > 0).all():
-        return np.full((size.size, size.size), np.inf)
-    triangle = np.linalg.qr(jacobian / size, mode="r")
-    if np.linalg.cond(triangle) > 1e10:
-        return np.full((size.size, size.size), np.inf)
-    root = np.linalg.inv(triangle) / size[:, None]
-    return root @ root.T
+        whole = covariance(problem.blocks((shared, poses)), problem.prior)
+    kept = np.r_[:k, k + problem.sags : len(whole)]
+    sagged = whole[k : k + problem.sags, k : k + problem.sags]
+    by_prior = problem.prior @ whole[: len(shared), : len(shared)] @ problem.prior.T
+    left = problem.residuals((shared, poses))
+    return Adjusted(
+        np.concatenate([shared[:k], poses.ravel()]), whole[np.ix_(kept, kept)], problem.corners_cost((shared, poses)),
+        sum(view.corners.size for view in problem.views), len(whole) - float(np.trace(by_prior)),
+        tuple(_all(board, found) for board, found in zip(boards, left, strict=True)),
+        problem.split(shared)[1], sagged if curved else np.zeros((2, 2)),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """One board's measured corners: places on it, images, and the whitening (m, 2, 2) of each."""
+class _Problem:
+    """Residuals of all boards, as functions of what they share (intrinsics, sags) and of the poses."""
 
-    places: np.ndarray
-    corners: np.ndarray
-    whiten: np.ndarray
+    views: list[View]
+    model: CameraModel
+    curved: bool
+    bent: np.ndarray
 
-    @classmethod
-    def of(cls, board: Board, square: float) -> View:
-        good = board.measured
-        whiten = np.linalg.inv(np.linalg.cholesky(board.covariance[good]))
-        return cls(_object(board, square)[good], board.corners[good], whiten)
+    @property
+    def sags(self) -> int:
+        return 2 if self.curved else 0
 
-    def residual(self, camera, pose: np.ndarray) -> np.ndarray:
-        """Whitened, shape (2 m,)."""
-        return np.einsum("nij,nj->ni", self.whiten, self._projected(camera, pose)[0] - self.corners).ravel()
+    @property
+    def focal(self) -> list[int]:
+        return [i for i, name in enumerate(self.model.names) if name in ("fx", "fy")]
 
-    def jacobian(self, camera, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of the whitened residuals by the pose (2 m, 6), and by fx, fy, cx, cy and five coefficients (2 m, 9)."""
-        raw = self._projected(camera, pose)[1].reshape(len(self.places), 2, -1)
-        whitened = np.einsum("nij,njk->nik", self.whiten, raw).reshape(2 * len(self.places), -1)
-        return whitened[:, :6], whitened[:, 6:15]
+    @property
+    def prior(self) -> np.ndarray:
+        return np.pad(self.model.prior, [(0, 0), (0, self.sags)])
 
-    def left(self, camera, pose: np.ndarray, board: Board) -> np.ndarray:
-        """Measured less projected corners of the whole board, px."""
-        found = np.full(board.corners.shape, np.nan)
-        found[board.measured] = self.corners - self._projected(camera, pose)[0]
+    def split(self, shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Intrinsics and both sags."""
+        k = len(self.model.names)
+        return shared[:k], shared[k:] if self.curved else self.bent
+
+    def blocks(self, point: Point) -> list[Block]:
+        shared, poses = point
+        values, sags = self.split(shared)
+        found = []
+        for view, pose in zip(self.views, poses, strict=True):
+            by_shared, own = view.jacobian(self.model, values, sags, pose)
+            residual = view.residual(self.model, values, sags, pose)
+            found.append(Block(residual, by_shared[:, : len(shared)], own))
         return found
 
-    def _projected(self, camera, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        points, by = cv2.projectPoints(self.places[:, None], pose[:3], pose[3:], camera[0], camera[1])[:2]
-        return points.reshape(-1, 2), by
+    def cost(self, point: Point) -> float:
+        known = self.prior @ point[0]
+        return self.corners_cost(point) + float(known @ known)
+
+    def corners_cost(self, point: Point) -> float:
+        given = self.split(point[0])
+        each = (view.residual(self.model, *given, pose) for view, pose in zip(self.views, point[1], strict=True))
+        return float(sum(residual @ residual for residual in each))
+
+    def residuals(self, point: Point) -> list[np.ndarray]:
+        given = self.split(point[0])
+        return [view.left(self.model, *given, pose) for view, pose in zip(self.views, point[1], strict=True)]
 
 
-def _object(board: Board, square: float) -> np.ndarray:
-    """Corners on the board, shape (n, 3), in the unit of the squares."""
-    return np.column_stack([square * board.places, np.zeros(len(board.corners))])
+def _all(board: Board, left: np.ndarray) -> np.ndarray:
+    """Residuals of the whole board, NaN where nothing was measured."""
+    found = np.full(board.corners.shape, np.nan)
+    found[board.measured] = left
+    return found

@@ -13,8 +13,9 @@ from scipy.special import chdtrc
 from measure.boards.adjustment import Adjusted, adjust, begin
 from measure.boards.chessboard import Board
 from measure.boards.eccentricity import centred
-from measure.boards.parameters import Model, read_model
-from measure.photo.lens import Intrinsics
+from measure.boards.parameters import SPLINED, CameraModel, Model, read_model, splined_control
+from measure.boards.splined import SplinedModel, fitted
+from measure.photo.lens import Intrinsics, SplinedIntrinsics
 from scenes import status
 from scenes.cameras.covariance import Covariance
 from scenes.errors import InvalidInput
@@ -32,19 +33,25 @@ class CameraCalibration:
 
     Attributes
     ----------
+    model : CameraModel
+        What is free, and how it sees.
     names : tuple of str
         The free intrinsics, in OpenCV's order; ``fx`` alone stands for both focal lengths where the model has one.
     values : ndarray, shape (k,)
         Of those, px for fx, fy, cx, cy.
     covariance : ndarray, shape (k, k)
         Of those; enlarged by ``dispersion``.
-    lens : Intrinsics
+    lens : Intrinsics or SplinedIntrinsics
         All intrinsics, as `measure.measure_quadrilateral` takes them.
     image_shape : (height, width)
     poses : ndarray, shape (boards, 6)
         Rotation vector (radians) and translation (unit of the squares) from each board to the camera, as OpenCV's.
     pose_covariance : ndarray, shape (boards, 6, 6)
         With the uncertainty of the squares' size, and enlarged by ``dispersion``.
+    sags, sag_covariance : ndarray, shape (2,) and (2, 2)
+        How far the board's middle stands out of the plane of its outer corners along columns and along rows, unit of
+        the squares, positive away from the camera: parabolas; 0 where it is taken for flat. Enlarged by
+        ``dispersion``.
     residuals : tuple of ndarray, shape (n, 2) each
         Measured less reprojected corners, px; NaN where there is no corner.
     rms_px : float
@@ -60,13 +67,16 @@ class CameraCalibration:
         the board is not flat), ``ill_conditioned`` (the boards do not determine the focal length to 10 %).
     """
 
+    model: CameraModel
     names: tuple[str, ...]
     values: np.ndarray
     covariance: np.ndarray
-    lens: Intrinsics
+    lens: Intrinsics | SplinedIntrinsics
     image_shape: tuple[int, int]
     poses: np.ndarray
     pose_covariance: np.ndarray
+    sags: np.ndarray
+    sag_covariance: np.ndarray
     residuals: tuple[np.ndarray, ...]
     rms_px: float
     chi_square: float
@@ -86,8 +96,26 @@ class CameraCalibration:
         return self.covariance / np.outer(self.sd, self.sd)
 
     @property
+    def is_splined(self) -> bool:
+        """Whether displacements are splines, and ``lens`` a `SplinedIntrinsics`."""
+        return isinstance(self.model, SplinedModel)
+
+    @property
+    def curved(self) -> bool:
+        """Whether the board may be bent."""
+        return bool(self.sag_covariance.any())
+
+    @property
     def for_budget(self) -> Covariance:
-        """The covariance as a scene's ``uncertainty.covariance``."""
+        """The covariance as a scene's ``uncertainty.covariance``.
+
+        Raises
+        ------
+        InvalidInput
+            Of a splined lens, whose numbers a scene does not take for uncertain.
+        """
+        if self.is_splined:
+            raise InvalidInput(f"model must be one of coefficients for a covariance that scenes take, got {SPLINED}")
         even = (self.covariance + self.covariance.T) / 2
         return Covariance(names=self.names, matrix=tuple(tuple(map(float, row)) for row in even))
 
@@ -98,6 +126,7 @@ def calibrate_camera(
     image_shape: tuple[int, int],
     model: str = DEFAULT_MODEL,
     square_sd: float = 0.0,
+    curved: bool = False,
 ) -> CameraCalibration:
     """Calibrate a camera from measured chessboards or grids of dots.
 
@@ -115,16 +144,21 @@ def calibrate_camera(
     image_shape : (height, width)
     model : str
         Free distortion coefficients with commas between, of k1, k2, p1, p2, k3; the others are 0. ``f`` among them:
-        one focal length, fx = fy. "none" for a pinhole. Centre and focal lengths are always free.
+        one focal length, fx = fy. "none" for a pinhole. Centre and focal lengths are always free. "splined", or
+        "splined:12x8" with that many control points, for bicubic splines (`scenes.cameras.Splined`): ``values`` are
+        then the focal length and combinations of control points, and the axis is in the image's middle.
     square_sd : float
         Standard uncertainty of ``square_size``, the same for all squares.
+    curved : bool
+        Whether the board may be bent: how far its middle stands out along columns and along rows is not known, either.
 
     Raises
     ------
     InvalidInput
         If an argument is bad, or there are too few boards, or they determine no camera.
     """
-    free = read_model(model)
+    control = splined_control(model)
+    free: CameraModel = read_model("none" if control else model)
     _check(square_size, square_sd, image_shape)
     if not isinstance(boards, list | tuple) or not all(isinstance(board, Board) for board in boards):
         raise InvalidInput("boards must be a list of Boards, got something else")
@@ -134,10 +168,15 @@ def calibrate_camera(
             f"boards must be at least {FEWEST_BOARDS}, of at least {FEWEST_CORNERS} measured corners each, "
             f"got {enough} such of {len(boards)}"
         )
-    found = adjust(boards, square_size, free, begin(boards, square_size, image_shape, free))
+    if control:
+        free, start = fitted(boards, square_size, image_shape, control)
+    else:
+        start = begin(boards, square_size, image_shape, read_model(model))
+    found = adjust(boards, square_size, free, start, curved)
     if any(board.radius > 0 for board in boards):
         for _ in range(_CENTRINGS):
-            found = adjust(centred(boards, square_size, free, found.parameters), square_size, free, found.parameters)
+            middles = centred(boards, square_size, free, found.parameters)
+            found = adjust(middles, square_size, free, found.parameters, curved)
     return _calibration(boards, free, image_shape, found, square_sd / square_size)
 
 
@@ -153,9 +192,9 @@ def _check(square_size: Any, square_sd: Any, image_shape: Any) -> None:
         raise InvalidInput(f"image_shape must be (height, width) in px, got {image_shape!r}")
 
 
-def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: float) -> CameraCalibration:
+def _calibration(boards, free: CameraModel, image_shape, found: Adjusted, scale_sd: float) -> CameraCalibration:
     k = len(free.names)
-    freedom = found.rows - found.covariance.shape[0]
+    freedom = found.rows - round(found.told) if np.isfinite(found.told) else 0
     p_value = float(chdtrc(freedom, found.chi_square)) if freedom > 0 else float("nan")
     dispersion = found.chi_square / freedom if p_value < _FALSE_ALARM else 1.0
     covariance = dispersion * found.covariance[:k, :k]
@@ -170,12 +209,21 @@ def _calibration(boards, free: Model, image_shape, found: Adjusted, scale_sd: fl
     state = status.ILL_CONDITIONED if vague else status.MISFIT if dispersion != 1.0 else status.OK
     all_residuals = np.concatenate(found.residuals)
     return CameraCalibration(
-        names=free.names, values=values, covariance=covariance,
-        lens=_lens(*free.camera(values)),
+        model=free, names=free.names, values=values, covariance=covariance,
+        lens=_seen_by(free, values),
         image_shape=(int(image_shape[0]), int(image_shape[1])), poses=poses, pose_covariance=np.array(blocks),
-        residuals=found.residuals, rms_px=float(np.sqrt(2 * np.nanmean(all_residuals**2))),
+        sags=found.sags,
+        sag_covariance=dispersion * found.sag_covariance, residuals=found.residuals,
+        rms_px=float(np.sqrt(2 * np.nanmean(all_residuals**2))),
         chi_square=found.chi_square, freedom=freedom, p_value=p_value, dispersion=float(dispersion), status=state,
     )  # fmt: skip
+
+
+def _seen_by(free: CameraModel, values: np.ndarray) -> Intrinsics | SplinedIntrinsics:
+    if isinstance(free, SplinedModel):
+        return SplinedIntrinsics(fx=values[0], cx=free.middle[0], cy=free.middle[1], spline=free.lens(values))
+    assert isinstance(free, Model)
+    return _lens(*free.camera(values))
 
 
 def _lens(matrix: np.ndarray, coefficients: np.ndarray) -> Intrinsics:

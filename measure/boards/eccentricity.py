@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 
 from measure.boards.chessboard import Board
-from measure.boards.parameters import Model
+from measure.boards.parameters import CameraModel
 
 _AROUND = 96  # places on a dot's outline: the polygon's middle is the outline's to 1e-3 of what it is off
 
 
-def centred(boards: Sequence[Board], square: float, model: Model, parameters: np.ndarray) -> list[Board]:
+def centred(boards: Sequence[Board], square: float, model: CameraModel, parameters: np.ndarray) -> list[Board]:
     """Boards whose measured centres are those of the dots themselves, by a camera and poses that are about known.
 
     Parameters
@@ -27,28 +27,27 @@ def centred(boards: Sequence[Board], square: float, model: Model, parameters: np
         As of `measure.boards.adjustment`: intrinsics, and six numbers of each pose.
     """
     k = len(model.names)
-    matrix, coefficients = model.camera(parameters[:k])
     poses = parameters[k:].reshape(-1, 6)
     return [
-        replace(board, corners=board.corners - offsets(board, square, pose, matrix, coefficients))
+        replace(board, corners=board.corners - offsets(board, square, pose, model, parameters[:k]))
         if board.radius > 0
         else board
         for board, pose in zip(boards, poses, strict=True)
     ]
 
 
-def offsets(board: Board, square: float, pose: np.ndarray, matrix: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+def offsets(board: Board, square: float, pose: np.ndarray, model: CameraModel, values: np.ndarray) -> np.ndarray:
     """Middle of each dot's image less the image of its middle, px, (n, 2)."""
     angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
     circle = board.radius * np.stack([np.cos(angle), np.sin(angle)], -1)
-    around = _projected(square * (board.places[:, None] + circle), pose, matrix, coefficients)
-    middle = _projected(square * board.places, pose, matrix, coefficients)
+    around = _projected(square * (board.places[:, None] + circle), pose, model, values)
+    middle = _projected(square * board.places, pose, model, values)
     return centroid(around - middle[:, None])
 
 
-def _projected(places: np.ndarray, pose: np.ndarray, matrix: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+def _projected(places: np.ndarray, pose: np.ndarray, model: CameraModel, values: np.ndarray) -> np.ndarray:
     flat = np.concatenate([places.reshape(-1, 2), np.zeros((places[..., 0].size, 1))], 1)
-    return cv2.projectPoints(flat[:, None], pose[:3], pose[3:], matrix, coefficients)[0].reshape(places.shape)
+    return model.seen(values, flat @ cv2.Rodrigues(pose[:3])[0].T + pose[3:])[0].reshape(places.shape)
 
 
 def centroid(outline: np.ndarray) -> np.ndarray:

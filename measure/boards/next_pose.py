@@ -13,10 +13,9 @@ from itertools import product
 import cv2
 import numpy as np
 
-from measure.boards.adjustment import View
 from measure.boards.camera import CameraCalibration
 from measure.boards.chessboard import Board
-from measure.boards.parameters import Model
+from measure.boards.view import View
 from scenes.board import numbered
 from scenes.errors import InvalidInput
 
@@ -91,27 +90,27 @@ def information(
     found: CameraCalibration, shape: tuple[int, int], square_size: float, pose: np.ndarray, sigma: float
 ) -> np.ndarray:
     """What corners known to ``sigma`` px, of a board at an unknown pose about (6,), tell of the camera, (k, k)."""
-    places, model = _grid(shape, square_size), Model(found.names)
-    view = View(places, np.zeros((len(places), 2)), np.broadcast_to(np.eye(2) / sigma, (len(places), 2, 2)))
-    by_pose, by_camera = view.jacobian(model.camera(found.values), pose)
+    places, flat = _grid(shape, square_size), np.zeros((shape[0] * shape[1], 2))
+    view = View(places, flat, np.broadcast_to(np.eye(2) / sigma, (len(places), 2, 2)), flat)
+    by_shared, by_pose = view.jacobian(found.model, found.values, np.zeros(2), pose)
     own = np.linalg.qr(by_pose)[0]
-    rest = model.derivatives(by_camera)
+    rest = by_shared[:, : len(found.names)]
     rest = rest - own @ (own.T @ rest)
     return rest.T @ rest
 
 
 def candidates(found: CameraCalibration, shape: tuple[int, int], square_size: float) -> np.ndarray:
     """Poses (N, 6) of boards that are whole in the image, outer squares too."""
-    camera, middle = Model(found.names).camera(found.values), _grid(shape, square_size).mean(0)
+    lens, middle = found.lens, _grid(shape, square_size).mean(0)
     height, width = found.image_shape
     outer = _grid((shape[0] + 2, shape[1] + 2), square_size) - [square_size, square_size, 0.0]
     away, poses = float(np.median([middle_of(pose, shape, square_size)[2] for pose in found.poses])), []
     for tilt, towards, roll, nearer, x, y in product(_TILTS, _TOWARDS, _ROLLS, _NEARER, _PLACES, _PLACES):
         axis = np.radians(tilt) * np.array([np.cos(np.radians(towards)), np.sin(np.radians(towards)), 0.0])
         rotation = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, np.radians(roll)]))[0]
-        there = nearer * away * np.array([x * width / camera[0][0, 0], y * height / camera[0][1, 1], 1.0])
+        there = nearer * away * np.array([x * width / lens.fx, y * height / lens.fy, 1.0])
         pose = np.concatenate([cv2.Rodrigues(rotation)[0].ravel(), there - rotation @ middle])
-        image = cv2.projectPoints(outer, pose[:3], pose[3:], *camera)[0].reshape(-1, 2)
+        image = found.model.seen(found.values, outer @ rotation.T + pose[3:])[0]
         if (image >= _MARGIN).all() and (image <= np.array([width, height]) - 1 - _MARGIN).all():
             poses.append(pose)
     return np.array(poses).reshape(-1, 6)

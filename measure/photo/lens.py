@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, ValidationError
 
 from imaging.features.locator import reach
+from imaging.geometry.lens import unbent
 from measure.estimators.gradient import gradient_along
 from measure.features.calipers import edge_calipers
 from measure.features.corners import corner_response, intersect, line_equations
@@ -18,6 +19,7 @@ from measure.features.layout import Layout
 from measure.features.lines import fit_lines, regression
 from measure.features.points import EdgePoints
 from scenes import InvalidInput
+from scenes.cameras import Splined
 from scenes.errors import describe
 from scenes.files.door import read_toml
 from scenes.model import Model
@@ -73,8 +75,37 @@ class Intrinsics(Model):
         return bent.reshape(points.shape)
 
 
-def load_lens(path: Path) -> Intrinsics:
-    """Read a lens from TOML.
+class SplinedIntrinsics(Model):
+    """One focal length, the image's middle and displacements that are splines, px and focal lengths."""
+
+    fx: _Focal
+    cx: Annotated[float, Field(ge=-1e9, le=1e9)]
+    cy: Annotated[float, Field(ge=-1e9, le=1e9)]
+    spline: Splined
+
+    @property
+    def fy(self) -> float:
+        """As fx: what differs is the splines'."""
+        return self.fx
+
+    def straighten(self, points: np.ndarray) -> np.ndarray:
+        """As `Intrinsics.straighten`; NaN where nothing is known of the lens."""
+        return self._middle + self.fx * unbent((np.asarray(points, float) - self._middle) / self.fx, self.spline)
+
+    def distort(self, points: np.ndarray) -> np.ndarray:
+        """The inverse of `straighten`."""
+        return self._middle + self.fx * self.spline.bent((np.asarray(points, float) - self._middle) / self.fx)
+
+    @property
+    def _middle(self) -> np.ndarray:
+        return np.array([self.cx, self.cy])
+
+
+AnyIntrinsics = Intrinsics | SplinedIntrinsics
+
+
+def load_lens(path: Path) -> AnyIntrinsics:
+    """Read a lens from TOML; a splined one has a table ``spline``.
 
     Raises
     ------
@@ -82,7 +113,8 @@ def load_lens(path: Path) -> Intrinsics:
         If the file cannot be read, is no TOML, or a value in it is bad.
     """
     try:
-        return Intrinsics.model_validate(read_toml(path))
+        told = read_toml(path)
+        return (SplinedIntrinsics if "spline" in told else Intrinsics).model_validate(told)
     except ValidationError as error:
         raise InvalidInput(f"{path}: {describe(error)}") from None
 
@@ -96,7 +128,7 @@ class Straightened:
     used: np.ndarray
 
 
-def straight_corners(image: np.ndarray, layout: Layout, lens: Intrinsics) -> Straightened:
+def straight_corners(image: np.ndarray, layout: Layout, lens: AnyIntrinsics) -> Straightened:
     """Corners of a layout given in straightened coordinates, from edge points found in the distorted image.
 
     Edge points are sought along the bent image of each side, straightened one by one, and fitted by straight lines.
@@ -131,7 +163,7 @@ def straight_corners(image: np.ndarray, layout: Layout, lens: Intrinsics) -> Str
     return _corners(layout, calipers, np.array(lines), blocks, np.array(used))
 
 
-def _bent(caliper, lens: Intrinsics) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bent(caliper, lens: AnyIntrinsics) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stations of a side, their places in the distorted image, and the unit normals there."""
     t = caliper.positions
     straight = caliper.at(t, np.zeros(1))

@@ -16,7 +16,7 @@ from measure.find.choose import find_in, nearest
 from measure.find.search import check_kinds, find
 from measure.photo.board_noise import board_covariance
 from measure.photo.ellipses import measure_ellipse
-from measure.photo.lens import Intrinsics
+from measure.photo.lens import AnyIntrinsics
 from measure.photo.noise import noise_sigma
 from measure.photo.quadrilateral import MeasuredValue, Quadrilateral, measure_quadrilateral
 from measure.photo.recording import recording
@@ -98,7 +98,7 @@ def photograph(
     kinds: tuple[str, ...] | None = None,
     most: int = 5,
     estimator: str = "arrangement",
-    lens: Intrinsics | None = None,
+    lens: AnyIntrinsics | None = None,
 ) -> Shapes:
     """Find shapes in a photograph and measure them, some at a time where there are several processors.
 
@@ -118,7 +118,7 @@ def photograph(
         How many are measured, the most prominent first.
     estimator : str
         Of the quadrilaterals and tags.
-    lens : Intrinsics, optional
+    lens : Intrinsics or SplinedIntrinsics, optional
         With it only quadrilaterals and tags are measured, for ellipses are not freed from distortion.
 
     Raises
@@ -146,7 +146,7 @@ def photograph(
     return Shapes(found, candidates)
 
 
-def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Intrinsics | None) -> MeasuredShape:
+def _measured(photo: Photograph, one: Candidate, estimator: str, lens: AnyIntrinsics | None) -> MeasuredShape:
     if one.kind in (CIRCLE, ELLIPSE):
         return _round(photo, one)
     if one.kind == CHESSBOARD:
@@ -155,7 +155,7 @@ def _measured(photo: Photograph, one: Candidate, estimator: str, lens: Intrinsic
 
 
 def _straight(
-    photo: Photograph, near: Any, one: Candidate | None, estimator: str, lens: Intrinsics | None
+    photo: Photograph, near: Any, one: Candidate | None, estimator: str, lens: AnyIntrinsics | None
 ) -> MeasuredShape:
     seen = photo
     if one is not None and one.kind == TAG:
@@ -170,7 +170,7 @@ def _straight(
     )  # fmt: skip
 
 
-def _residuals(photo: Photograph, told: Quadrilateral, lens: Intrinsics | None) -> tuple[Residuals, ...]:
+def _residuals(photo: Photograph, told: Quadrilateral, lens: AnyIntrinsics | None) -> tuple[Residuals, ...]:
     return of_sides(photo.levels, told.corners) if lens is None else ()
 
 

@@ -16,7 +16,7 @@ from measure.goodness import WORST
 from measure.photo.binned import back, bin_size, binned, into
 from measure.photo.expected import Expected, expected, likeliest
 from measure.photo.grown import grown_covariance
-from measure.photo.lens import Intrinsics, straight_corners
+from measure.photo.lens import AnyIntrinsics, straight_corners
 from measure.photo.noise_curve import NoiseCurve
 from measure.photo.profiles import refined
 from measure.photo.recording import Recording, recording
@@ -81,7 +81,7 @@ class Quadrilateral:
 def measure_quadrilateral(
     image: np.ndarray | Photograph,
     estimator: str = "arrangement",
-    lens: Intrinsics | None = None,
+    lens: AnyIntrinsics | None = None,
     corners: np.ndarray | None = None,
 ) -> Quadrilateral:
     """Measure a quadrilateral: the one near ``corners``, or else the most prominent one.
@@ -92,7 +92,7 @@ def measure_quadrilateral(
         Grey levels, linear in the light; `scenes.photograph.read` makes them of a file.
     estimator : {"strip", "arrangement", "isophote", "gradient", "canny"}
         With a lens always ``gradient``, whose edge points are freed from distortion one by one.
-    lens : Intrinsics, optional
+    lens : Intrinsics or SplinedIntrinsics, optional
         Intrinsics and distortion.
     corners : array_like, shape (4, 2), optional
         Where its corners are, (x, y), px, to some 5 px, in order around it.

@@ -31,12 +31,14 @@ from tests.proofs.mixed import mixed
 from tests.proofs.msa import msa
 from tests.proofs.pairs import pairs
 from tests.proofs.parts import parts
+from tests.proofs.peer import peer
 from tests.proofs.photographs import photographs
 from tests.proofs.placements import placements
 from tests.proofs.processed import processed
 from tests.proofs.rate import rate
 from tests.proofs.real_noise import real_noise
 from tests.proofs.shots import shots
+from tests.proofs.splined import splined
 from tests.proofs.stations import stations
 from tests.proofs.telecentric import telecentric
 from tests.proofs.uneven import uneven
@@ -71,6 +73,7 @@ app.command()(mixed)
 app.command()(msa)
 app.command()(pairs)
 app.command()(parts)
+app.command()(peer)
 app.command()(photographs)
 app.command()(placements)
 app.command()(processed)
@@ -80,6 +83,7 @@ app.command()(uneven)
 app.command()(usable)
 app.command()(varied)
 app.command()(shots)
+app.command()(splined)
 app.command()(stations)
 app.command()(telecentric)
 

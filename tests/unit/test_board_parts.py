@@ -11,11 +11,12 @@ from scipy.stats import chi2
 from imaging.boards.fitting import Crossings
 from imaging.boards.windows import steps, windows
 from measure.boards import chessboard
-from measure.boards.adjustment import _inverse, _object
 from measure.boards.camera import CameraCalibration, _calibration, _check
 from measure.boards.chessboard import _board, _clipped, _nothing, _started, check_shape, least_noise
+from measure.boards.elimination import Block, covariance, minimised
 from measure.boards.growing import _alternates, _alternation, _next, grown, trimmed
 from measure.boards.parameters import read_model
+from measure.boards.view import on_board
 from measure.photo import board_noise
 from measure.photo.binned import binned
 from measure.photo.board_noise import board_covariance
@@ -261,22 +262,61 @@ def test_free_intrinsics(text, names, fixed):
     assert model.flags == sum(flags[name] for name in fixed.split())
 
 
-def test_inverse_normal_matrix():
-    """Columns of very different sizes; infinite where one is nothing, or nearly another."""
-    jacobian = np.random.default_rng(3).normal(size=(20, 4)) * [1.0, 1e6, 1e-5, 3.0]
-    size = np.linalg.norm(jacobian, axis=0)
-    unit = np.linalg.inv((jacobian / size).T @ (jacobian / size))
-    assert _inverse(jacobian) * np.outer(size, size) == pytest.approx(unit, rel=1e-9)
-    jacobian[:, 3] = jacobian[:, 0] * (1 + 1e-13)
-    assert (_inverse(jacobian) == np.inf).all()
-    jacobian[:, 3] = 0
-    assert _inverse(jacobian).shape == (4, 4)
-    assert (_inverse(jacobian) == np.inf).all()
+def blocks_of(rng, boards=3):
+    """Linear residuals of four shared unknowns of very different sizes and of six numbers of each board, and the same
+    as one matrix."""
+    shared = rng.normal(size=(boards, 20, 4)) * [1.0, 1e6, 1e-5, 3.0]
+    own = rng.normal(size=(boards, 20, 6)) * [1, 1, 1, 1e-3, 1e-3, 1e-3]
+    right = rng.normal(size=(boards, 20))
+    whole = np.zeros((20 * boards, 4 + 6 * boards))
+    for i in range(boards):
+        whole[20 * i : 20 * i + 20, :4] = shared[i]
+        whole[20 * i : 20 * i + 20, 4 + 6 * i : 10 + 6 * i] = own[i]
+    return shared, own, right, whole
+
+
+def test_covariance_of_shared_unknowns_and_poses():
+    """That of the whole normal matrix; infinite where a column is nothing, or nearly another."""
+    shared, own, _, whole = blocks_of(np.random.default_rng(3))
+    prior = np.array([[0.0, 0.0, 1e5, 0.0]])
+    every = np.concatenate([whole, np.pad(prior, [(0, 0), (0, 18)])])
+    size = np.linalg.norm(every, axis=0)
+    unit = np.linalg.inv((every / size).T @ (every / size))
+
+    def found():
+        return covariance([Block(np.zeros(20), *each) for each in zip(shared, own, strict=True)], prior)
+
+    assert found() * np.outer(size, size) == pytest.approx(unit, rel=1e-9, abs=1e-12)
+    shared[..., 3] = shared[..., 0] * (1 + 1e-13)
+    assert (found() == np.inf).all()
+    shared[..., 3] = 0
+    assert found().shape == (22, 22)
+    assert (found() == np.inf).all()
+
+
+def test_least_squares_with_poses_eliminated():
+    """Of linear residuals the solution of the whole matrix, a prior's rows among them."""
+    shared, own, right, whole = blocks_of(np.random.default_rng(4))
+    prior = np.array([[2.0, 0.0, 0.0, 0.0]])
+
+    def blocks(point):
+        residuals = [a @ point[0] + b @ p - r for a, b, p, r in zip(shared, own, point[1], right, strict=True)]
+        return [Block(*each) for each in zip(residuals, shared, own, strict=True)]
+
+    def cost(point):
+        return sum(block.residual @ block.residual for block in blocks(point)) + 4 * point[0][0] ** 2
+
+    every = np.concatenate([whole, np.pad(prior, [(0, 0), (0, 18)])])
+    expected = np.linalg.lstsq(every, np.append(right.ravel(), 0.0))[0]
+    found = minimised(blocks, cost, prior, (np.ones(4), np.ones((3, 6))), lambda shared: True)
+    assert np.append(*map(np.ravel, found)) == pytest.approx(expected, rel=1e-7)
+    held = minimised(blocks, cost, prior, (np.ones(4), np.ones((3, 6))), lambda shared: shared[0] > 0.5)
+    assert held[0][0] > 0.5
 
 
 def test_places_of_corners_on_a_board():
     board = told(np.zeros((6, 2)), np.tile(np.eye(2), (6, 1, 1)), (3, 2))
-    assert _object(board, 2.5).tolist() == [[0, 0, 0], [2.5, 0, 0], [5, 0, 0], [0, 2.5, 0], [2.5, 2.5, 0], [5, 2.5, 0]]
+    assert on_board(board, 2.5).tolist() == [[0, 0, 0], [2.5, 0, 0], [5, 0, 0], [0, 2.5, 0], [2.5, 2.5, 0], [5, 2.5, 0]]
 
 
 @pytest.mark.parametrize(
@@ -306,6 +346,7 @@ def calibration(chi_square, rows=40, covariance=1.0, scale_sd=0.0):
     whole = covariance * root @ root.T
     found = SimpleNamespace(
         parameters=np.concatenate([values, poses.ravel()]), covariance=whole, chi_square=chi_square, rows=rows,
+        told=16.0, sags=np.zeros(2), sag_covariance=np.zeros((2, 2)),
         residuals=(np.array([[3.0, 4.0], [np.nan, np.nan]]), np.array([[0.0, 1.0]])),
     )  # fmt: skip
     return _calibration(None, read_model("none"), (480, 640), found, scale_sd), whole, poses

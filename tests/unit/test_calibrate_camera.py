@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from scipy import stats
@@ -96,6 +97,30 @@ def test_boards_side_by_side_determine_no_focal_length(seed):
     level = [np.array([0, 0, 0.1 * i, -100.0 + 5 * i, -62.0, 420.0 + 10 * i]) for i in range(4)]
     found = measure.calibrate_camera(boards(level, np.random.default_rng(seed)), 25.0, SHAPE, model="none")
     assert found.status == "ill_conditioned"
+
+
+def test_a_bent_board_is_told_with_its_sags(seen):
+    """Of 30 calibrations the sags and intrinsics scatter as told; taken for flat, the board is a misfit."""
+    true, rng, total, away = np.array([1.2, -0.7]), np.random.default_rng(10), 0.0, []
+    covariance = 0.01**2 * np.eye(2)
+    flat = told(np.zeros((54, 2)), np.tile(covariance, (54, 1, 1)), SMALL.board)
+    x, y = ((flat.places - [4, 2.5]) / [4, 2.5]).T
+    places = np.column_stack([flat.places * SMALL.square, true[0] * (1 - x**2) + true[1] * (1 - y**2)])
+    for _ in range(30):
+        bent = []
+        for pose in seen:
+            image = cv2.projectPoints(places, pose[:3], pose[3:], SMALL.matrix, np.array(SMALL.distortion))[0]
+            bent.append(replace(flat, corners=image.reshape(-1, 2) + 0.01 * rng.standard_normal((54, 2))))
+        found = measure.calibrate_camera(bent, SMALL.square, SHAPE, curved=True)
+        assert found.status == "ok"
+        left = np.append(found.sags - true, found.values - SMALL.values)
+        total += left[2:] @ np.linalg.solve(found.covariance, left[2:])
+        away.append(np.linalg.solve(np.linalg.cholesky(found.sag_covariance), left[:2]))
+    for squares, rows in ((float((np.array(away) ** 2).sum()), 60), (total, 270)):
+        low, high = stats.chi2.ppf([0.003, 0.997], rows)
+        assert low < squares < high  # margin: chance, 99.4 %; 30 seeded calibrations
+        assert not low < squares * 2 < high  # margin: 2 lies beyond 99.4 %; 30 seeded calibrations
+    assert measure.calibrate_camera(bent, SMALL.square, SHAPE).status == "misfit"
 
 
 def test_the_covariance_is_one_that_budgets_read(seen):

@@ -9,7 +9,9 @@ import pytest
 from scipy.spatial import KDTree
 
 import measure
+from measure.boards.camera import DEFAULT_MODEL
 from measure.boards.eccentricity import offsets
+from measure.boards.parameters import read_model
 from scenes import InvalidInput
 from tests.boards import SMALL, poses
 from tests.commands import ice
@@ -47,7 +49,7 @@ def test_centres_are_those_of_the_images_of_dots(grids, seen):
         nearest = KDTree(truth).query(grid.corners)[1]
         assert sorted(nearest) == list(range(35))
         there = replace(grid, radius=RADIUS, shape=RIG.board)  # in the order of `truth`
-        ahead = offsets(there, RIG.square, pose, RIG.matrix, np.array(RIG.distortion))[nearest]
+        ahead = offsets(there, RIG.square, pose, read_model(DEFAULT_MODEL), RIG.values)[nearest]
         away.append(_whitened(grid, grid.corners - truth[nearest] - ahead))
         raw.append(_whitened(grid, grid.corners - truth[nearest]))
     away, raw = np.concatenate(away), np.concatenate(raw)  # 280 numbers: their standard deviation is known to 4 %
@@ -66,7 +68,7 @@ def test_middle_of_an_ellipse_is_the_closed_form():
     turn = cv2.Rodrigues(pose[:3])[0]
     homography = matrix @ np.column_stack([turn[:, 0], turn[:, 1], pose[3:]])
     grid = measure.Board((3, 2), np.zeros((6, 2)), np.zeros((6, 2, 2)), ("ok",) * 6, np.ones(6), 1.0, 0.7, RADIUS)
-    found = offsets(grid, RIG.square, pose, matrix, np.zeros(5))
+    found = offsets(grid, RIG.square, pose, read_model("none"), matrix[[0, 1, 0, 1], [0, 1, 2, 2]])
     for place, off in zip(grid.places * RIG.square, found, strict=True):
         (x, y), r = place, RADIUS * RIG.square
         conic = np.array([[1, 0, -x], [0, 1, -y], [-x, -y, x**2 + y**2 - r**2]])

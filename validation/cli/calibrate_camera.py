@@ -48,8 +48,15 @@ class Options:
         float | None, typer.Option(metavar="LENGTH", help="Side of the markers, of the same unit as --square.")
     ] = None
     model: Annotated[
-        str, typer.Option(help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none.")
+        str,
+        typer.Option(
+            help="Free coefficients with commas between: k1, k2, p1, p2, k3, f (fx = fy); or none; or splined, "
+            "splined:12x8 with that many control points."
+        ),
     ] = "k1,k2,p1,p2,k3"
+    curved: Annotated[
+        bool, typer.Option(help="The board may be bent: how far its middle stands out is unknown, too.")
+    ] = False
     noise: Annotated[
         float | None, typer.Option(help="Standard deviation of the noise, grey levels; else from each image.")
     ] = None
@@ -75,36 +82,53 @@ def calibrate_camera_command(given: Options) -> None:
     The board is a chessboard; with --dots a grid of dots; with --charuco a ChArUco board, with --markers a grid of
     markers: both need --shape and --marker, and a part of them is enough.
 
+    --model splined fits displacements that are splines, and says whether boards that are left out are seen better so
+    than with the usual coefficients: only then they are proposed.
+
     --next proposes where to hold the board for the next photograph, and says what that would leave of U.
 
-    -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance. Exit status 1 if the
+    -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance (not of a splined lens:
+    a scene does not take its numbers for uncertain). Exit status 1 if the
     boards do not determine the focal length.
     """
     printed = _checked(given)
     import measure
-    from measure.boards.parameters import read_model
+    from measure.boards.camera import DEFAULT_MODEL
+    from measure.boards.parameters import read_model, splined_control
     from scenes import status
     from validation.boards import read_boards
     from validation.report import camera_table
 
-    read_model(given.model)
-    scene, beside = given.scene, given.output and _beside(given.output)
+    splined = splined_control(given.model) is not None
+    if splined and given.following is not None:
+        raise InvalidInput(f"--next must be used without --model {given.model}, got {given.following!r}")
+    if not splined:
+        read_model(given.model)
+    scene, beside = given.scene, None if splined else given.output and _beside(given.output)
     camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
         size = camera and Size(camera.height, camera.width, scene)
         seen = read_boards(given.boards, printed, given.noise, shown, size)
     for _, reason in seen.left_out:
         print(f"left out: {reason}", file=sys.stderr)
-    found = measure.calibrate_camera(seen.boards, given.square, seen.image_shape, given.model, given.square_sd)
+    found = measure.calibrate_camera(
+        seen.boards, given.square, seen.image_shape, given.model, given.square_sd, given.curved
+    )
+    models = (DEFAULT_MODEL, given.model)
+    compared = (
+        measure.compare_models(seen.boards, given.square, seen.image_shape, models, given.curved) if splined else None
+    )
     lines = camera_table.scene_lines(found, scene, beside) if scene is not None else None
     proposal = _proposal(given, found, seen)
     written = _write_files(found, seen, given.output, given.residuals)
     if given.as_json:
-        told = camera_table.facts(found, seen, given.units)
+        told = camera_table.facts(found, seen, given.units, compared)
         told |= {} if lines is None else {"scene": lines}
         say(told if proposal is None else {**told, "next": proposal.facts}, True, "")
     else:
         _show(found, seen, given.units, lines)
+        if compared is not None:
+            console().print(camera_table.comparison(compared), highlight=False)
         if proposal is not None:
             console().print(proposal.text, highlight=False)
         for path in written:
@@ -176,9 +200,11 @@ def _write_files(found, seen, output: Path | None, residuals: Path | None) -> li
 
     written = []
     if output is not None:
-        written += [output, _beside(output)]
+        written.append(output)
         _write(output, camera_table.lens_file(found))
-        _write(_beside(output), camera_table.covariance_file(found))
+        if not found.is_splined:
+            written.append(_beside(output))
+            _write(_beside(output), camera_table.covariance_file(found))
     if residuals is not None:
         from validation.report import camera_figure  # matplotlib takes half a second to load
 
@@ -193,7 +219,7 @@ def _show(found, seen, units: str, lines: str | None) -> None:
     shown = console()
     shown.print(camera_table.boards(found, seen, units))
     shown.print(camera_table.parameters(found))
-    shown.print(camera_table.summary(found), highlight=False)
+    shown.print(camera_table.summary(found, units), highlight=False)
     if lines is not None:
         print(f"\n{lines}")
 

@@ -11,7 +11,9 @@ from rich.table import Table
 
 import scenes
 from measure.boards.camera import CameraCalibration
+from measure.boards.cross_validation import Compared
 from measure.goodness import WORST
+from measure.photo.lens import SplinedIntrinsics
 from scenes import InvalidInput
 from scenes.results import picked
 from scenes.status import legend
@@ -50,15 +52,16 @@ def parameters(found: CameraCalibration) -> Table:
     table = cells.table(
         "Camera", "", "value", "+- (1 sigma)", "unit", words=("", "unit"), wrap=True, caption=_OF_CAMERA
     )
-    for name, value, sd in zip(found.names, found.values, found.sd, strict=True):
+    shown = slice(1) if found.is_splined else slice(None)
+    for name, value, sd in zip(found.names[shown], found.values[shown], found.sd[shown], strict=True):
         pixels = name in ("fx", "fy", "cx", "cy")
         digits = int(np.clip(1 - np.floor(np.log10(sd)), 0, 12)) if 0 < sd < np.inf else 4
         table.add_row(name, f"{value:.{digits}f}", f"{sd:.2g}", "px" if pixels else "")
     return table
 
 
-def summary(found: CameraCalibration) -> str:
-    """What the residuals say, and the strongest correlations."""
+def summary(found: CameraCalibration, units: str) -> str:
+    """What the residuals say, how the board is bent, and the strongest correlations."""
     lines = [
         f"{found.status}: reprojection {found.rms_px:.4f} px rms; chi-square {found.chi_square:.1f} for "
         f"{found.freedom} degrees of freedom, p = {found.p_value:.2g} (the chance of so large residuals if board and "
@@ -67,9 +70,21 @@ def summary(found: CameraCalibration) -> str:
     if found.dispersion != 1:
         lines.append(
             f"The corners lie further off than their covariance says: all covariances are multiplied by "
-            f"{found.dispersion:.3g}. Another --model, or a board that is not flat?"
+            f"{found.dispersion:.3g}. Another --model, or a board that is not flat (--curved)?"
         )
-    pairs = _strong(found)
+    if found.curved:
+        (x, y), (dx, dy) = found.sags, np.sqrt(np.diag(found.sag_covariance))
+        lines.append(
+            f"The board's middle stands out by {x:+.4g} +- {dx:.2g} {units} along its columns and {y:+.4g} +- {dy:.2g} "
+            f"{units} along its rows, away from the camera if positive."
+        )
+    if isinstance(found.lens, SplinedIntrinsics):
+        columns, rows = len(found.lens.spline.right[0]), len(found.lens.spline.right)
+        lines.append(
+            f"Displacements are splines over the {found.lens.spline.plane} plane, {columns} x {rows} control points; "
+            "the axis is the ray that is seen in the image's middle."
+        )
+    pairs = [] if found.is_splined else _strong(found)
     if pairs:
         strong = abs(pairs[0][2]) > _STRONG
         title = "strongly correlated, so that the boards hardly tell them apart" if strong else "strongest correlation"
@@ -77,8 +92,24 @@ def summary(found: CameraCalibration) -> str:
     return "\n".join(lines + legend([found.status]))
 
 
+def comparison(compared: Compared) -> str:
+    """What boards that were left out say of two models."""
+    (plain, other), (first, second) = compared.models, compared.rms_px
+    why = (
+        "they are seen better so, beyond chance"
+        if compared.proposed == other
+        else "no better beyond chance by the other"
+    )
+    return (
+        f"boards that are left out in turn: {first:.4f} px rms by {plain}, {second:.4f} px by {other}, "
+        f"p = {compared.p_value:.2g}. Proposed: {compared.proposed} ({why})."
+    )
+
+
 def lens_file(found: CameraCalibration) -> str:
     """TOML as `measure.load_lens` reads it."""
+    if isinstance(found.lens, SplinedIntrinsics):
+        return _splined_file(found, found.lens)
     lens, sd = found.lens, dict(zip(found.names, found.sd, strict=True))
     lines = [f"# {found.status}: {found.rms_px:.4g} px rms, p = {found.p_value:.2g}; 1 sigma beside each number"]
     lines += [f"{name} = {getattr(lens, name)!r}  # +- {sd[name]:.2g} px" if name in sd else
@@ -86,6 +117,23 @@ def lens_file(found: CameraCalibration) -> str:
     told = ", ".join(f"{name} {sd[name]:.2g}" for name in ("k1", "k2", "p1", "p2", "k3") if name in sd)
     lines.append(f"distortion = {list(map(float, lens.distortion))}  # +- {told or 'not free'}")
     return "\n".join(lines) + "\n"
+
+
+def _splined_file(found: CameraCalibration, lens: SplinedIntrinsics) -> str:
+    return "\n".join([
+        f"# {found.status}: {found.rms_px:.4g} px rms, p = {found.p_value:.2g}; 1 sigma beside each number",
+        f"fx = {lens.fx!r}  # +- {found.sd[0]:.2g} px",
+        f"cx = {lens.cx!r}  # the image's middle",
+        f"cy = {lens.cy!r}",
+        "",
+        "[spline]",
+        *_spline_lines(lens),
+    ]) + "\n"  # fmt: skip
+
+
+def _spline_lines(lens: SplinedIntrinsics) -> list[str]:
+    told = lens.spline.model_dump(include={"kind", "plane", "extent", "right", "down"})
+    return [f"{key} = {json.dumps(value)}" for key, value in told.items()]
 
 
 def covariance_file(found: CameraCalibration) -> str:
@@ -112,6 +160,9 @@ def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> st
             f"{camera.width} x {camera.height}"
         )
     lens = found.lens
+    if isinstance(lens, SplinedIntrinsics):
+        unknown = "# How well this lens is known, a scene does not take: U of its values is without it."
+        return "\n".join(["[camera]", f"focal_px = {lens.fx!r}", unknown, "", "[camera.lens]", *_spline_lines(lens)])
     off = lens.cx - (width - 1) / 2, lens.cy - (height - 1) / 2
     told = ", ".join(f"{key} = {json.dumps(value)}" for key, value in _covariance(found).items())
     given = json.dumps(beside.name) if beside else f"{{ {told} }}"
@@ -126,20 +177,31 @@ def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> st
     ])  # fmt: skip
 
 
-def facts(found: CameraCalibration, seen: Boards, units: str) -> dict[str, Any]:
+def facts(found: CameraCalibration, seen: Boards, units: str, compared: Compared | None = None) -> dict[str, Any]:
     """The document of ``ice calibrate-camera --json``."""
     lens = found.lens
+    if isinstance(lens, SplinedIntrinsics):
+        bent = {"spline": lens.spline.model_dump(include={"plane", "extent", "right", "down"})}
+    else:
+        bent = {"distortion": list(lens.distortion)}
     return {
         "status": found.status,
         "image": list(found.image_shape[::-1]),
         "units": units,
-        "lens": {**picked(lens, "fx", "fy", "cx", "cy"), "distortion": list(lens.distortion)},
+        "lens": {**picked(lens, "fx", "fy", "cx", "cy"), **bent},
         "names": list(found.names),
         "values": found.values.tolist(),
         "sd": found.sd.tolist(),
         "covariance": found.covariance.tolist(),
         "correlation": found.correlation.tolist(),
         **picked(found, "rms_px", "chi_square", "freedom", "p_value", "dispersion"),
+        "sags": found.sags.tolist() if found.curved else None,
+        "sag_sd": np.sqrt(np.diag(found.sag_covariance)).tolist() if found.curved else None,
+        "compared": compared
+        and {
+            **picked(compared, "rms_px", "p_value", "proposed"),
+            "models": list(compared.models),
+        },
         "boards": _board_facts(found, seen),
         "left_out": [{"file": str(path), "reason": reason} for path, reason in seen.left_out],
     }

@@ -297,7 +297,7 @@ def _camera_told():
     with folder():
         return {
             "printed": printed(camera_table.boards(found, seen, "mm"), camera_table.parameters(found)),
-            "summary": [camera_table.summary(each) for each in (found, other)],
+            "summary": [camera_table.summary(each, "mm") for each in (found, other)],
             "lens": camera_table.lens_file(found),
             "covariance": camera_table.covariance_file(found),
             "facts": camera_table.facts(found, seen, "mm"),
