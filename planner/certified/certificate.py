@@ -10,7 +10,6 @@ import numpy as np
 from planner.certified.cells import Boxes
 from planner.certified.pulls import is_known
 from planner.certified.search import LIGHTS, SENSORS, Found, Search
-from planner.certified.sensor_terms import SensorTerms
 from planner.constraints import WHOLE, Constraints
 from planner.planning import Plan
 from planner.search.candidates import RayTraced, SettingUp
@@ -144,10 +143,6 @@ def check_certifiable(found: Plan, limits: Constraints) -> None:
             "scene must be of one matt convex part, edges, one free point of light and a lens without distortion for a "
             f"certificate, got {scene.name}"
         )
-    if not _within_image(scene):
-        raise InvalidInput(
-            f"scene must have its edges within the image from everywhere for a certificate, got {scene.name}"
-        )
 
 
 def _has_terms(scene: Scene) -> bool:
@@ -157,18 +152,6 @@ def _has_terms(scene: Scene) -> bool:
     plain = noise.colour is None and not noise.is_shared
     light = len(scene.free) == 1 and not any(scene.lights[0].offset)
     return bool(has_bound(scene, "calibrated") and lens and plain and light and is_known(scene))
-
-
-def _within_image(scene: Scene) -> bool:
-    """Whether all of the edges that count lies within the image from wherever it is seen."""
-    camera, solid = scene.camera, scene.solid
-    names = SensorTerms(scene, Aim.of(scene.quantities, "object")).names
-    ends = solid.vertices[[end for name in names for end in solid.edge(name).ends]] - np.array(camera.look_at)
-    far = float(np.linalg.norm(ends, axis=1).max())
-    margin = scene.locator.window_px + 4 * scene.locator.scale_px + 1
-    room = min(camera.width, camera.height) / 2 - 0.5 - margin
-    away = camera.distance**2 - (camera.perspective * far) ** 2
-    return away > 0 and camera.focal_px * far / np.sqrt(away) <= room
 
 
 def _range(azimuth: tuple[float, float] | None) -> tuple[float, float]:

@@ -19,8 +19,8 @@ from imaging.features.locator import MIN_USABLE, PIXEL_VARIANCE, reach
 from imaging.geometry.visibility import boundaries
 from imaging.models.along import NODE_WEIGHTS, NODES
 from imaging.models.calibrated import SHORT
-from planner.certified.enclosed import HUGE, Enclosed, either
-from planner.certified.series import bernstein, dot, with_last, within
+from planner.certified.enclosed import HUGE, Enclosed, either, variables
+from planner.certified.series import bernstein, direction, dot, frame, with_last, within
 from scenes import Edge, Scene
 
 _PLACES = np.concatenate([[-1.0], NODES, [1.0]])  # of nodes, in half used lengths from the middle
@@ -36,19 +36,28 @@ class View:
     Attributes
     ----------
     scene : Scene
-    axis : list of Enclosed
-        Unit vector towards the sensor, by its components, shape (n,) each.
+    axis, right, down : list of Enclosed
+        Unit vectors towards the sensor and along the image's axes, by their components, shape (n,) each.
     seen : ndarray of bool, shape (F,)
         Which of the solid's faces all see.
     """
 
     scene: Scene
     axis: list[Enclosed]
+    right: list[Enclosed]
+    down: list[Enclosed]
     seen: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, polar: np.ndarray, azimuth: np.ndarray, seen: np.ndarray) -> View:
+        """From cells (n, 2), (n, 2), rad."""
+        angles = variables(polar, azimuth)
+        return cls(scene, direction(*angles), *frame(*angles, np.radians(scene.camera.roll_deg)), seen)
 
     def of_boxes(self, some: np.ndarray) -> View:
         """Of some of the cells alone."""
-        return View(self.scene, [part.of_boxes(some) for part in self.axis], self.seen)
+        axes = ([part.of_boxes(some) for part in axis] for axis in (self.axis, self.right, self.down))
+        return View(self.scene, *axes, self.seen)
 
     def along(self, vector: np.ndarray) -> Enclosed:
         """Of a vector (3,) the part along the axis, its unit."""
@@ -64,6 +73,12 @@ class View:
         """D of a place (3,), scene units."""
         camera = self.scene.camera
         return self.along(-camera.perspective * (place - np.array(camera.look_at))) + camera.distance
+
+    def image(self, place: np.ndarray) -> tuple[Enclosed, Enclosed]:
+        """Where a place (3,) is seen, px from the image's middle to the right and down."""
+        away, scale = place - np.array(self.scene.camera.look_at), self.divisor(place).inverse()
+        x, y = (dot(axis, away * self.scene.camera.focal_px) * scale for axis in (self.right, self.down))
+        return x, y
 
     def over(self, corner: np.ndarray, one: np.ndarray, other: np.ndarray, edges: tuple[Edge, Edge]) -> Enclosed:
         """w . (one x other) of a corner and directions of edges that meet there, of the sign that a face tells that
@@ -128,7 +143,7 @@ class Line:
             for other in solid.meeting[here]:
                 if other is not self.edge and boundaries(solid, (other,), self.view.seen)[0]:
                     trim = trim.larger(self._beside(other, end, self.clear))
-            found.append(trim)
+            found.append(self._framed(trim, end))
         return found[0], found[1]
 
     @cached_property
@@ -137,6 +152,19 @@ class Line:
         least = 1 - self.wanted[0] / self.length.high
         one, other = self._trims
         return one.kept(0.0, least - other.low), other.kept(0.0, least - one.low)
+
+    def _framed(self, trim: Enclosed, end: int) -> Enclosed:
+        """With what of an end lies outside the image or too near to its border (`projected_edges.within_image`)."""
+        scene = self.view.scene
+        margin = scene.locator.window_px + 4 * scene.locator.scale_px + 1
+        here, there = (self.view.image(scene.solid.vertices[self.edge.ends[k]]) for k in (end, 1 - end))
+        for size, own, other in zip((scene.camera.width, scene.camera.height), here, there, strict=True):
+            for side in (-1.0, 1.0):
+                beyond = own * side - ((size - 1) / 2 - margin)
+                if (beyond.high > 0).any():
+                    inward = (own - other) * side
+                    trim = trim.larger(beyond.at_least(0.0) * inward.at_least(0.0).inverse())
+        return trim
 
     def _beside(self, other: Edge, end: int, clear: float) -> Enclosed:
         """`imaging.features.projected_edges.trim_beside` over the length, beside a neighbour."""

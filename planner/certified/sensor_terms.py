@@ -97,7 +97,7 @@ class SensorTerms:
         """Of cells (n, 2), (n, 2), rad, the same `faces` (F,) being seen from all."""
         whole = np.zeros(len(self.scene.solid.faces), bool)
         whole[self.faces] = seen
-        view = View(self.scene, direction(*variables(polar, azimuth)), whole)
+        view = View.of(self.scene, polar, azimuth, whole)
         lost, each = np.zeros(len(polar), bool), []
         for name in self.names:
             edge = self.scene.solid.edge(name)

@@ -17,6 +17,17 @@ def direction(polar: Enclosed, azimuth: Enclosed) -> list[Enclosed]:
     return [across * cosine(azimuth), across * sine(azimuth), cosine(polar)]
 
 
+def frame(polar: Enclosed, azimuth: Enclosed, roll: float) -> tuple[list[Enclosed], list[Enclosed]]:
+    """Axes of the image, right and down, of sensors turned by ``roll``, rad (`imaging.geometry.projection`)."""
+    ahead, aside, level, none = cosine(azimuth), sine(azimuth), cosine(polar), polar * 0.0
+    right, down = [-aside, ahead, none], [level * ahead, level * aside, -sine(polar)]
+    turned = float(np.cos(roll)), float(np.sin(roll))
+    return (
+        [a * turned[0] + b * turned[1] for a, b in zip(right, down, strict=True)],
+        [b * turned[0] - a * turned[1] for a, b in zip(right, down, strict=True)],
+    )
+
+
 def dot(one: list[Enclosed], other: list[Enclosed] | np.ndarray) -> Enclosed:
     """Scalar product of vectors by their components; of arrays (..., 3) by their last axis."""
     parts = np.moveaxis(other, -1, 0) if isinstance(other, np.ndarray) else other
