@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from planner.budgeting.budgets import SceneBudget, budget
     from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
-    from planner.certified.certificate import Certificate, certified
+    from planner.certifying.certificate import Certificate, certified
 
 _LATER = {
     "BundleBudget": "budgeting.bundles", "SceneBudget": "budgeting.budgets", "budget": "budgeting.budgets",
     "bundle_budget": "budgeting.bundles", "CapabilityPlan": "budgeting.plans", "plan_capability": "budgeting.plans",
-    "Certificate": "certified.certificate", "certified": "certified.certificate",
+    "Certificate": "certifying.certificate", "certified": "certifying.certificate",
 }  # fmt: skip
 
 

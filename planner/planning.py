@@ -33,7 +33,7 @@ from scenes import InvalidInput, Pose, Scene, several
 from scenes.results import Shown, finite, poses
 
 if TYPE_CHECKING:
-    from planner.certified.certificate import Certificate
+    from planner.certifying.certificate import Certificate
 
 Search = Literal["exhaustive", "alternating"]
 Edges = Literal["given", "best"]

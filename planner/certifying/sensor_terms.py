@@ -16,10 +16,10 @@ import numpy as np
 from imaging.features.locator import MIN_USABLE
 from imaging.features.projected_edges import straight
 from imaging.models.calibrated import SHORT
-from planner.certified.enclosed import HUGE, Enclosed, variables
-from planner.certified.lines import Line, View
-from planner.certified.pulls import Pull, pulls_of
-from planner.certified.series import DEGREE, direction, dot, spread_over, stacked
+from planner.certifying.enclosed import HUGE, Enclosed, variables
+from planner.certifying.lines import Line, View
+from planner.certifying.pulls import Pull, pulls_of
+from planner.certifying.series import DEGREE, direction, dot, spread_over, stacked
 from planner.search.objective import Aim
 from scenes import Edge, Scene
 

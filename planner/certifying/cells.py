@@ -9,11 +9,11 @@ from typing import Self
 
 import numpy as np
 
-from planner.certified.enclosed import HUGE, ROUNDING, Enclosed
-from planner.certified.light_terms import LightTerms
-from planner.certified.lines import UNEVEN
-from planner.certified.sensor_terms import SensorTerms
-from planner.certified.series import DEGREE
+from planner.certifying.enclosed import HUGE, ROUNDING, Enclosed
+from planner.certifying.light_terms import LightTerms
+from planner.certifying.lines import UNEVEN
+from planner.certifying.sensor_terms import SensorTerms
+from planner.certifying.series import DEGREE
 
 _AT_ONCE = 256  # cells of which terms are made
 _EDGE_ON = 1e-9  # of the distance: a face seen so nearly edge-on may be seen or not
@@ -168,8 +168,9 @@ class SensorCells:
             here = np.flatnonzero((seen == way).all(1))
             for at in range(0, len(here), _AT_ONCE):
                 some = here[at : at + _AT_ONCE]
-                made = terms.of(boxes.polar[some], boxes.azimuth[some], way)
-                found.append(Table.of(made.factors, long=made.long, brief=made.brief, norms=made.norms))
+                with np.errstate(all="ignore"):  # what is not bounded
+                    made = terms.of(boxes.polar[some], boxes.azimuth[some], way)
+                    found.append(Table.of(made.factors, long=made.long, brief=made.brief, norms=made.norms))
                 lost[some] = made.lost
                 order.append(some)
         return np.maximum(sides, 0), Table.joined(found).some(np.argsort(np.concatenate(order))), lost
@@ -205,8 +206,9 @@ class LightCells:
         return self._parts
 
     def _told(self, boxes: Boxes) -> tuple[Table, np.ndarray]:
-        found, uneven, hot = self.terms.of(boxes.polar, boxes.azimuth)
-        return Table.of(found, uneven=uneven), hot
+        with np.errstate(all="ignore"):  # what is not bounded
+            found, uneven, hot = self.terms.of(boxes.polar, boxes.azimuth)
+            return Table.of(found, uneven=uneven), hot
 
 
 def _joined(one: Boxes, other: Boxes) -> Boxes:
@@ -222,7 +224,7 @@ def bounds(sensors: SensorCells, lights: LightCells, pairs: np.ndarray) -> tuple
     middle, low, high = (getattr(k, name)[at][:, None] for name in ("middle", "low", "high"))
     tilt, slack = (np.moveaxis(getattr(k, name), 1, 0)[(slice(None), *at)][:, :, None] for name in ("tilt", "slack"))
     natural = _edge_by_edge(s, low, high, k.uneven[:, None]).sum(-1)
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         at_middle, size = _sum(s.middle * middle), np.abs(s.middle)
         wide, centre, most = (high - low) / 2, (high + low) / 2, np.maximum(np.abs(low), np.abs(high))
         by_sensor = sum(
@@ -239,7 +241,7 @@ def bounds(sensors: SensorCells, lights: LightCells, pairs: np.ndarray) -> tuple
 
 def _edge_by_edge(s: Table, low: np.ndarray, high: np.ndarray, uneven: np.ndarray) -> np.ndarray:
     """Lower bound of each edge's part, (p, M, E), from the ranges of all factors alone; no edge takes away."""
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         long, brief = (np.where(part >= 0, part * low, part * high).sum(-1) for part in (s.long, s.brief))
         norm = np.maximum(s.norms[..., 0] - uneven[..., None] * s.norms[..., 1], 0.0)
         glance = norm**2 * low[..., : DEGREE + 1].min(-1)[..., None]

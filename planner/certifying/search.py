@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from imaging.geometry.projection import direction
-from planner.certified.cells import Boxes, LightCells, SensorCells, bounds
-from planner.certified.enclosed import HUGE
-from planner.certified.light_terms import LightTerms
-from planner.certified.sensor_terms import SensorTerms
+from planner.certifying.cells import Boxes, LightCells, SensorCells, bounds
+from planner.certifying.enclosed import HUGE
+from planner.certifying.light_terms import LightTerms
+from planner.certifying.sensor_terms import SensorTerms
 from planner.search.objective import Report, SearchProblem, cut_off
 
 SENSORS, LIGHTS = 7.5, 10.0  # degrees, of the first cells

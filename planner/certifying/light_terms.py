@@ -18,8 +18,8 @@ import numpy as np
 from imaging.light.appearance import whites
 from imaging.pictures import Pictures
 from imaging.sensor import headroom
-from planner.certified.enclosed import HUGE, Enclosed, variables
-from planner.certified.series import DEGREE, direction, dot, stacked, with_last
+from planner.certifying.enclosed import HUGE, Enclosed, variables
+from planner.certifying.series import DEGREE, direction, dot, stacked, with_last
 from scenes import Scene
 
 SIDES = ((True, False), (False, True), (True, True))  # which of an edge's faces are seen

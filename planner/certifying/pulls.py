@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.certified.enclosed import Enclosed
+from planner.certifying.enclosed import Enclosed
 from scenes import Corner, Edge, Quantity, Scene, Side, Solid
 from scenes.measurands.evaluated import Line, Point
 from scenes.measurands.features import Between, ends_of, outward, plane_of, point_of, points_of
@@ -19,8 +19,8 @@ from scenes.measurands.kinds import MEASURANDS
 from scenes.viewpoint import Viewpoint
 
 if TYPE_CHECKING:
-    from planner.certified.lines import Line as Image
-    from planner.certified.lines import View
+    from planner.certifying.lines import Line as Image
+    from planner.certifying.lines import View
 
 _NONE = 1e-12  # of the largest: a place that moves nothing
 

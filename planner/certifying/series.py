@@ -6,7 +6,7 @@ from math import comb
 
 import numpy as np
 
-from planner.certified.enclosed import HUGE, Enclosed, cosine, sine
+from planner.certifying.enclosed import HUGE, Enclosed, cosine, sine
 
 DEGREE = 6  # of the polynomials along an edge
 

@@ -19,8 +19,8 @@ from imaging.features.locator import MIN_USABLE, PIXEL_VARIANCE, reach
 from imaging.geometry.visibility import boundaries
 from imaging.models.along import NODE_WEIGHTS, NODES
 from imaging.models.calibrated import SHORT
-from planner.certified.enclosed import HUGE, Enclosed, either, variables
-from planner.certified.series import bernstein, direction, dot, frame, with_last, within
+from planner.certifying.enclosed import HUGE, Enclosed, either, variables
+from planner.certifying.series import bernstein, direction, dot, frame, with_last, within
 from scenes import Edge, Scene
 
 _PLACES = np.concatenate([[-1.0], NODES, [1.0]])  # of nodes, in half used lengths from the middle

@@ -7,9 +7,9 @@ from itertools import islice
 
 import numpy as np
 
-from planner.certified.cells import Boxes
-from planner.certified.pulls import is_known
-from planner.certified.search import LIGHTS, SENSORS, Found, Search
+from planner.certifying.cells import Boxes
+from planner.certifying.pulls import is_known
+from planner.certifying.search import LIGHTS, SENSORS, Found, Search
 from planner.constraints import WHOLE, Constraints
 from planner.planning import Plan
 from planner.search.candidates import RayTraced, SettingUp
