@@ -93,8 +93,8 @@ def certified(
     Examples
     --------
     >>> import planner, scenes
-    >>> found = planner.plan(scenes.load("task1"), step_deg=6)
     >>> near = planner.Constraints(sensor_polar_deg=(25, 28), sensor_azimuth_deg=(10, 14), light_polar_deg=(10, 20))
+    >>> found = planner.plan(scenes.load("task1"), constraints=near, step_deg=3)
     >>> certified(found, near).certificate.proved
     True
     """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ _TRIED = 64  # middles of pairs of cells that are evaluated at a time
 _FINE = 0.125  # of a light's cell: the sensor's is divided first until it is so small, where its slopes are not bounded
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Found:
     """What a search by cells knows, as it goes on.
 
@@ -46,7 +46,6 @@ class Found:
     within_scale: bool = False
 
 
-@dataclass(eq=False)
 class Search:
     """Of all poses of the constraints' ranges.
 
@@ -62,12 +61,11 @@ class Search:
         Pairs of cells, at most.
     """
 
-    problem: SearchProblem
-    sensors: SensorCells
-    lights: LightCells
-    found: Found
-    share: float
-    most: int
+    def __init__(
+        self, problem: SearchProblem, sensors: SensorCells, lights: LightCells, found: Found, share: float, most: int
+    ) -> None:
+        self.problem, self.sensors, self.lights = problem, sensors, lights
+        self.found, self.share, self.most = found, share, most
 
     @classmethod
     def of(cls, problem: SearchProblem, found: Found, boxes: tuple[Boxes, Boxes], share: float, most: int) -> Search:
@@ -78,19 +76,22 @@ class Search:
 
     def run(self, report: Report) -> Found:
         """Until nothing is open, or as many pairs were bounded."""
-        pairs, found = self._first(), self.found
+        pairs = self._first()
         while len(pairs):
             bound, parts = self._bounded(pairs)
-            open_ = bound < (1 - self.share) * found.value
-            found.least = min(found.least, bound[~open_].min(initial=np.inf))
+            open_ = bound < (1 - self.share) * self.found.value
+            self._excluded(bound[~open_])
             self._try(pairs[open_], bound[open_])
-            if found.pairs + 4 * open_.sum() > self.most:
-                found.least = min(found.least, float(bound[open_].min(initial=np.inf)))
+            if self.found.pairs + 4 * open_.sum() > self.most:
+                self._excluded(bound[open_])
                 break
-            report("excluding cells of poses", found.pairs, found.pairs + 4 * int(open_.sum()))
+            report("excluding cells of poses", self.found.pairs, self.found.pairs + 4 * int(open_.sum()))
             pairs = self._divided(pairs[open_], parts[open_])
-        found.within_scale = bool(self.lights.hot.any())
-        return found
+        return replace(self.found, within_scale=bool(self.lights.hot.any()))
+
+    def _excluded(self, bound: np.ndarray) -> None:
+        """What no pose is below of cells that are left."""
+        self.found = replace(self.found, least=min(self.found.least, float(bound.min(initial=np.inf))))
 
     def _first(self) -> np.ndarray:
         """Pairs of the first cells; sensors that no light makes good enough are left out."""
@@ -101,7 +102,7 @@ class Search:
             pairs = np.column_stack([open_, np.zeros(len(open_), int)])
             bound = self._bounded(pairs, one)[0]
             out = bound >= (1 - self.share) * self.found.value
-            self.found.least = min(self.found.least, bound[out].min(initial=np.inf))
+            self._excluded(bound[out])
             fine = (self.sensors.boxes.radii[open_] < _ALONE) | (bound > 0.1 * self.found.value)
             kept.append(open_[~out & fine])
             wide = open_[~out & ~fine]
@@ -115,7 +116,7 @@ class Search:
         told = [bounds(self.sensors, lights or self.lights, pairs[at : at + _CHUNK])
                 for at in range(0, len(pairs), _CHUNK)]  # fmt: skip
         bound, parts = (np.concatenate([each[k] for each in told]) for k in (0, 1))
-        self.found.pairs += len(pairs)
+        self.found = replace(self.found, pairs=self.found.pairs + len(pairs))
         return (bound, parts) if lights else (np.where(self._is_allowed(pairs), bound, HUGE), parts)
 
     def _is_allowed(self, pairs: np.ndarray) -> np.ndarray:
@@ -140,7 +141,7 @@ class Search:
         values = np.where(cut_off(problem.errors(s, k), problem.scene), np.inf, values)
         i = int(np.argmin(values))
         if values[i] < found.value:
-            found.value, found.sensor, found.light = float(values[i]), s[i], k[i]
+            self.found = replace(found, value=float(values[i]), sensor=s[i], light=k[i])
 
     def _divided(self, pairs: np.ndarray, parts: np.ndarray) -> np.ndarray:
         """The pairs of which one cell is cut in four: that which makes the bound worse."""
