@@ -33,17 +33,19 @@ if TYPE_CHECKING:
     from planner.budgeting.budgets import SceneBudget, budget
     from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
+    from planner.certifying.certificate import Certificate, certified
 
 _LATER = {
-    "BundleBudget": "bundles", "SceneBudget": "budgets", "budget": "budgets", "bundle_budget": "bundles",
-    "CapabilityPlan": "plans", "plan_capability": "plans",
+    "BundleBudget": "budgeting.bundles", "SceneBudget": "budgeting.budgets", "budget": "budgeting.budgets",
+    "bundle_budget": "budgeting.bundles", "CapabilityPlan": "budgeting.plans", "plan_capability": "budgeting.plans",
+    "Certificate": "certifying.certificate", "certified": "certifying.certificate",
 }  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    """Budgets are loaded when they are asked for: statistics take a third of a second."""
+    """Budgets and certificates are loaded when they are asked for: statistics take a third of a second."""
     if name in _LATER:
-        return getattr(import_module(f"planner.budgeting.{_LATER[name]}"), name)
+        return getattr(import_module(f"planner.{_LATER[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
@@ -57,6 +59,7 @@ __all__ = [
     "BundlePrediction",
     "Candidate",
     "CapabilityPlan",
+    "Certificate",
     "Choice",
     "Chosen",
     "Combination",
@@ -79,6 +82,7 @@ __all__ = [
     "Views",
     "budget",
     "bundle_budget",
+    "certified",
     "combine",
     "coverage",
     "exhaustive",

@@ -121,14 +121,14 @@ class Constraints:
     def _pairs(self, scene: Scene, sensors: np.ndarray, lights: np.ndarray, which: int) -> np.ndarray:
         """The same of one of the lights."""
         cosine = np.einsum("...i,...i->...", direction(sensors), direction(lights))
-        allowed = cosine <= self._most(scene, which)
+        allowed = cosine <= self.largest_cosine(scene, which)
         if self.same_mount:
             allowed = allowed & (cosine > 1 - 1e-12)
         if self.light_out_of_view:
             allowed = allowed & ~_in_view(scene, sensors, lights, which)
         return allowed
 
-    def _most(self, scene: Scene, which: int) -> float:
+    def largest_cosine(self, scene: Scene, which: int) -> float:
         """Largest cosine of the angle between sensor and a light; above 1 where any is allowed."""
         apart = np.cos(np.radians(self.min_separation_deg)) if self.min_separation_deg > 0 else np.inf
         if self.same_mount:

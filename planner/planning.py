@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from planner.search.objective import (
 from planner.search.varying import Variation
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.results import Shown, finite, poses
+
+if TYPE_CHECKING:
+    from planner.certifying.certificate import Certificate
 
 Search = Literal["exhaustive", "alternating"]
 Edges = Literal["given", "best"]
@@ -90,6 +93,8 @@ class Plan(Shown):
     varied : Varied, optional
         What other polarisers, another lamp or another filter gain, with poses of their own; all else is about the
         scene's own choice.
+    certificate : Certificate, optional
+        What is proved of all poses, also between those of a grid (`certified`).
     """
 
     scene: Scene
@@ -116,6 +121,7 @@ class Plan(Shown):
     candidates: tuple[Candidate, ...]
     set_aside: tuple[Candidate, ...]
     varied: Varied | None = None
+    certificate: Certificate | None = None
 
     @property
     def poses(self) -> tuple[Pose, Pose | tuple[Pose, ...]]:

@@ -38,7 +38,7 @@ _CHECKED, _MOST_CHECKED = 10, 1000
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered in a second or so
 _NOT_CAPABILITY = (
     "--over", "--search", "--model", "--edges", "--start", "--shares", "--tolerance", "--check", "--map", "--out",
-    "--views", "--views-share", "--vary", "--hold", "--write",
+    "--views", "--views-share", "--vary", "--hold", "--write", "--certify",
 )  # fmt: skip
 _NOT_COVERAGE = tuple(each for each in _NOT_CAPABILITY if each != "--model")
 
@@ -110,6 +110,13 @@ class Options:
         str | None,
         typer.Option(metavar="WHAT", help="Equal with --vary: time (of exposure; default) or white (its level)."),
     ] = None
+    certify: Annotated[
+        bool,
+        typer.Option(
+            "--certify",
+            help="Prove that no pose at all is better by over 1 % (a matt convex part, a point light).",
+        ),
+    ] = False
     check: Annotated[
         int | None,
         typer.Option(
@@ -254,6 +261,10 @@ def _check_options(given: Options) -> None:
     check_number("--light-body", given.light_body, 0, 1e12)
     if given.same_mount and given.separation > 0:
         raise scenes.InvalidInput(f"--separation must be left out with --same-mount, got {given.separation:g}")
+    for option in ("views", "views_share", "coverage", "sensor", "light", "vary") if given.certify else ():
+        if getattr(given, option):
+            name = option.replace("_", "-")
+            raise scenes.InvalidInput(f"--certify must be left out with --{name}, got both")
     check_file("--map", given.map_file, ".png")
     check_directory("--out", given.out)
 
@@ -265,6 +276,8 @@ def _planned(scene: scenes.Scene, given: Options, how: dict, count: int) -> Plan
     tolerances = _tolerances(given.tolerance or [], scene)
     how |= {"search": given.search, "edges": given.edges, "shares": given.shares}
     found, seconds = _plan(scene, given.objective, how | _varied(scene, given.vary, given.hold))
+    if given.certify:
+        found = _certified(found, how["constraints"])
     safe = planner.robust(found, tolerances, how["constraints"]) if tolerances else None
     checked = _check(found, count, asked=given.check is not None) if count else None
     scatter = _check_varied(found) if found.varied and count else None
@@ -327,6 +340,13 @@ def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan,
     with progress(f"{scene.name}: searching places of sensor and light{also}", "steps", at_once=True) as shown:
         found = planner.plan(scene, objective, **how, report=shown)
     return found, time.perf_counter() - began
+
+
+def _certified(found: planner.Plan, limits: planner.Constraints) -> planner.Plan:
+    import planner
+
+    with progress(f"{found.scene.name}: excluding all poses that would be better", "cells", at_once=True) as shown:
+        return planner.certified(found, limits, report=shown)
 
 
 def _check(found: planner.Plan, count: int, asked: bool) -> PlanCheck:

@@ -36,6 +36,7 @@ def facts(found: planner.Plan, checked: PlanCheck | None, safe: planner.Robust |
         },
         "alternating": _alternating(found),
         **picked(found, "guarantee", "pairs", "evaluated"),
+        "certificate": None if found.certificate is None else dataclasses.asdict(found.certificate),
         "candidates": [_with_poses(candidate) for candidate in found.candidates],
         "set_aside": [_with_poses(candidate) for candidate in found.set_aside],
         **_checked(checked),

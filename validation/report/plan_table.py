@@ -95,6 +95,9 @@ def _searched(found: planner.Plan, seconds: float) -> str:
         f"  Found among {found.pairs} pairs of places in {seconds:.1f} s{_ruled_out(found)}.",
         f"  Guarantee: {found.guarantee}.",
     ]
+    if found.certificate:
+        done = "Certificate" if found.certificate.proved else "No certificate, but"
+        lines.append(f"  {done}: {found.certificate.told}.")
     if not found.steady:
         off = " or ".join(sorted({f"{how_far(found.scene, role):.2g}" for role in ("sensor", "light")}))
         lines.append(f"  Hard to set up: {off} degrees off something cannot be measured any more.")

@@ -1,0 +1,163 @@
+"""The certificate of a plan: that no pose whatever is better by more than a share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from planner.certifying.cells import Boxes
+from planner.certifying.pulls import is_known
+from planner.certifying.search import LIGHTS, SENSORS, Found, Search
+from planner.constraints import WHOLE, Constraints
+from planner.planning import Plan
+from planner.search.candidates import RayTraced, SettingUp
+from planner.search.exhaustive import has_bound
+from planner.search.grid import as_array, as_poses
+from planner.search.objective import Aim, Report, SearchProblem
+from scenes import InvalidInput, Pose, Scene
+from scenes.status import is_trusted
+
+WITHIN = 0.01
+MOST_PAIRS = 5_000_000  # of cells: some minutes
+_CLOSELY = 3  # places beside a better one that are looked at closely
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What is proved of all poses of sensor and light that a plan's constraints allow.
+
+    Attributes
+    ----------
+    proved : bool
+        Whether none is better than the plan by more than ``within`` of what it minimises.
+    within : float
+    better_by : float
+        By which share of that none is better.
+    least : float
+        What no pose is below.
+    pairs : int
+        Pairs of cells of poses that were bounded.
+    within_scale : bool
+        Whether this is of those poses alone whose levels the end of the scale does not cut off.
+    """
+
+    proved: bool
+    within: float
+    better_by: float
+    least: float
+    pairs: int
+    within_scale: bool
+
+    @property
+    def told(self) -> str:
+        """In one sentence, without its end."""
+        poses = "no pose" + " whose levels are within the sensor's scale" * self.within_scale
+        return (
+            f"{poses}, also between those of a grid, has less than {100 * (1 - self.better_by):.3g} % of this variance"
+        )
+
+
+def certified(
+    found: Plan,
+    constraints: Constraints | None = None,
+    *,
+    within: float = WITHIN,
+    most: int = MOST_PAIRS,
+    report: Report | None = None,
+) -> Plan:
+    """The plan, or a better one that is found on the way, with its certificate.
+
+    All poses within the constraints' polar angles and azimuths are covered by cells of the sensor's and the light's
+    poses, which are divided until a lower bound of what `predict` says in a pair of cells excludes it. Of one convex
+    matt part under one free point of light, by the ``calibrated`` model, in the object. It is assumed that the variance
+    of no edge is negative, and that rounding errors are below a relative 1e-9. Constraints on what the sensor sees, and
+    forbidden regions, only leave out places that the certificate covers, too.
+
+    Parameters
+    ----------
+    found : Plan
+    constraints : Constraints, optional
+        Those of the plan.
+    within : float
+        The share that is to be proved.
+    most : int
+        Pairs of cells after which it ends, unproved.
+
+    Raises
+    ------
+    InvalidInput
+        If the plan is of another kind.
+
+    Examples
+    --------
+    >>> import planner, scenes
+    >>> near = planner.Constraints(sensor_polar_deg=(25, 28), sensor_azimuth_deg=(10, 14), light_polar_deg=(10, 20))
+    >>> found = planner.plan(scenes.load("task1"), constraints=near, step_deg=3)
+    >>> certified(found, near).certificate.proved
+    True
+    """
+    scene, limits = found.scene, (constraints or Constraints()).on_side_of(found.scene)
+    check_certifiable(found, limits)
+    if not 0 < within < 1:
+        raise InvalidInput(f"within must be above 0 and below 1, got {within}")
+    problem = SearchProblem(scene, found.model, Aim.of(scene.quantities, found.objective, found.over), limits)
+    boxes = (
+        Boxes.over(limits.sensor_polar_deg or WHOLE, _range(limits.sensor_azimuth_deg), SENSORS),
+        Boxes.over(limits.light_polar_deg or WHOLE, _range(limits.light_azimuth_deg), LIGHTS),
+    )
+    start = Found(found.variance, np.array(list(found.sensor)), as_array(found.light))
+    known = Search.of(problem, start, boxes, within, most).run(report or (lambda *_: None))
+    better = _better(problem, found, known) if known.value < found.variance else found
+    by = max(0.0, 1 - known.least / better.variance)
+    told = Certificate(by <= within * (1 + 1e-9), within, by, float(known.least), known.pairs, known.within_scale)
+    return replace(better, certificate=told)
+
+
+def _better(problem: SearchProblem, found: Plan, known: Found) -> Plan:
+    """The plan at the best place found, if that can be set up and is trusted as much."""
+    untrusted = sum(not is_trusted(each.status) for each in found.prediction.measurands)
+    for pair in islice(SettingUp(problem, (False, False)).offers(known.sensor, known.light), _CLOSELY):
+        taken = RayTraced.of(problem, *pair)
+        if taken.value < found.variance and taken.untrusted <= untrusted:
+            told, limiting = taken.prediction, taken.prediction.limiting or taken.prediction.measurands[0].name
+            place = Pose(*map(float, taken.sensor)), as_poses(taken.light)
+            return replace(found, sensor=place[0], light=place[1], steady=True, variance=taken.value,
+                           prediction=told, limiting=limiting)  # fmt: skip
+    return found
+
+
+def check_certifiable(found: Plan, limits: Constraints) -> None:
+    """See that bounds are known for what a plan is of."""
+    scene = found.scene
+    if (found.model, found.objective) != ("calibrated", "object"):
+        raise InvalidInput(
+            f"model and objective must be calibrated and object for a certificate, got {found.model} and "
+            f"{found.objective}"
+        )
+    if limits.same_mount:
+        raise InvalidInput("same_mount must be left out for a certificate, got both")
+    if not _has_terms(scene):
+        raise InvalidInput(
+            "scene must be of one matt convex part, edges, one free point of light and a lens without distortion for a "
+            f"certificate, got {scene.name}"
+        )
+
+
+def _has_terms(scene: Scene) -> bool:
+    camera, noise = scene.camera, scene.noise
+    lens = not camera.lens.bends and camera.blur_field is None
+    lens &= camera.aperture_radius == 0 or camera.perspective == 1
+    plain = noise.colour is None and not noise.is_shared
+    light = len(scene.free) == 1 and not any(scene.lights[0].offset)
+    return bool(has_bound(scene, "calibrated") and lens and plain and light and is_known(scene))
+
+
+def _range(azimuth: tuple[float, float] | None) -> tuple[float, float]:
+    """Azimuths from one to another, growing."""
+    if azimuth is None:
+        return 0.0, 360.0
+    low, high = azimuth
+    width = 360.0 if abs(high - low) == 360 else (high - low) % 360
+    return low, low + width
