@@ -160,7 +160,8 @@ class _Tracer:
 
     @property
     def is_large(self) -> bool:
-        some = self.random and not self.quality.everywhere
+        apart = self.scalar and self.quality.alike  # what surfaces send to each other
+        some = self.random and (apart or not self.quality.everywhere)
         return some or is_large(self.crop, self.quality.supersample, self.random)
 
     @cached_property

@@ -102,7 +102,8 @@ def fine_pixels(
     if renders.bounced is not None:
         direct = fine_pixels(picture, crop, replace(renders, random=False, bounced=None), reach, rays)
         moving = near_required(picture, crop, k, _MOVING)
-        near = np.ones_like(near) if renders.everywhere else near
+        if renders.everywhere:
+            near, moving = np.ones_like(near), np.ones_like(moving)
         if renders.even is not None:
             near = renders.even.lent_to(near)
         return direct + fine_of(_bounced(renders.bounced, near, moving, few), k)

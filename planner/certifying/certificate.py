@@ -140,15 +140,15 @@ def check_certifiable(found: Plan, limits: Constraints) -> None:
         raise InvalidInput("same_mount must be left out for a certificate, got both")
     if not _has_terms(scene):
         raise InvalidInput(
-            "scene must be of one matt convex part, edges, one free point of light and a lens without distortion for a "
-            f"certificate, got {scene.name}"
+            "scene must be of one matt convex part, distances of corners, one free point of light and a perspective lens "
+            f"without distortion for a certificate, got {scene.name}"
         )
 
 
 def _has_terms(scene: Scene) -> bool:
     camera, noise = scene.camera, scene.noise
     lens = not camera.lens.bends and camera.blur_field is None
-    lens &= camera.aperture_radius == 0 or camera.perspective == 1
+    lens &= camera.perspective == 1
     plain = noise.colour is None and not noise.is_shared
     light = len(scene.free) == 1 and not any(scene.lights[0].offset)
     return bool(has_bound(scene, "calibrated") and lens and plain and light and is_known(scene))

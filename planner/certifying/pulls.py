@@ -165,9 +165,6 @@ def pulls_of(scene: Scene, quantity: Quantity) -> list[Pull]:
 
 
 def is_known(scene: Scene) -> bool:
-    """Whether all quantities are of corners and edges, by kinds that one picture tells."""
-    kinds = all(
-        MEASURANDS[each.kind].pictures == 1 and (each.kind == "distance" or plane_of(scene.solid, each) is not None)
-        for each in scene.quantities
-    )
+    """Whether all quantities are distances of corners in a plane: those of which bounds have been shown to hold."""
+    kinds = all(each.kind == "distance" and plane_of(scene.solid, each) is not None for each in scene.quantities)
     return kinds and all(isinstance(feature, Corner | Side) for feature in scene.features)
