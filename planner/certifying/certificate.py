@@ -140,8 +140,8 @@ def check_certifiable(found: Plan, limits: Constraints) -> None:
         raise InvalidInput("same_mount must be left out for a certificate, got both")
     if not _has_terms(scene):
         raise InvalidInput(
-            "scene must be of one matt convex part, distances of corners, one free point of light and a perspective lens "
-            f"without distortion for a certificate, got {scene.name}"
+            "scene must be of one matt convex part, distances of corners, one free point of light and a perspective "
+            f"lens without distortion for a certificate, got {scene.name}"
         )
 
 

@@ -15,7 +15,7 @@ from math import comb
 
 import numpy as np
 
-from imaging.light.appearance import whites
+from imaging.light.edge_sides import whites
 from imaging.pictures import Pictures
 from imaging.sensor import headroom
 from planner.certifying.enclosed import HUGE, Enclosed, variables
