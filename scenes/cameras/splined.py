@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.interpolate import NdBSpline
 
 from scenes.cameras.lens import Lens
 from scenes.cameras.lens_model import LENSES, LensModel
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
 
 DEGREE = 3
 Plane = Literal["normalised", "stereographic"]
@@ -83,6 +85,8 @@ class Splined(LensModel):
 @lru_cache(maxsize=16)
 def _splines(extent: tuple[float, ...], right: _Rows, down: _Rows) -> NdBSpline:
     """Both displacements over the plane; NaN beyond the extent."""
+    from scipy.interpolate import NdBSpline  # slow to load, and rarely needed
+
     control = np.stack([np.array(right).T, np.array(down).T], -1)
     return NdBSpline(knots(extent, control.shape[:2]), control, DEGREE, extrapolate=False)
 
