@@ -165,6 +165,6 @@ def pulls_of(scene: Scene, quantity: Quantity) -> list[Pull]:
 
 
 def is_known(scene: Scene) -> bool:
-    """Whether all quantities are distances of corners in a plane: those of which bounds have been shown to hold."""
-    kinds = all(each.kind == "distance" and plane_of(scene.solid, each) is not None for each in scene.quantities)
+    """Whether all quantities are distances of corners: those of which bounds have been shown to hold."""
+    kinds = all(each.kind == "distance" for each in scene.quantities)
     return kinds and all(isinstance(feature, Corner | Side) for feature in scene.features)
