@@ -89,7 +89,9 @@ def test_what_cannot_be_is_one_line(folder, monkeypatch, capsys, tmp_path):
     )
     assert refused(monkeypatch, capsys, *some, "--square", 0)[1] == "--square must be at least 1e-09, got 0.0"
     assert refused(monkeypatch, capsys, *some, "--square", 25, "--units", "ell")[0] == 2
-    assert refused(monkeypatch, capsys, *some, "--square", 25, "--model", "k4")[1].startswith("model must be none, splined, or")
+    assert refused(monkeypatch, capsys, *some, "--square", 25, "--model", "k4")[1].startswith(
+        "model must be none, splined, or"
+    )
     assert refused(monkeypatch, capsys, *some[:3], "--square", 25, "--next", "distance")[1].endswith(
         "--next must be used with --scene, got 'distance' alone"
     )
