@@ -274,10 +274,13 @@ class _Tracer:
         k, shape = self.quality.supersample, tuple(part.stop - part.start for part in self.crop)
         first = tuple(part.start for part in self.film(k)[1])
         every = np.ones(len(self.picture.scene.bodies.normals), bool)
-        return Even(
-            lambda marked: lent_to(self.picture, marked, first, 1),
-            lambda: some_of(dilated(edges_of(self.picture, every, shape, self.start, k, creases=True), 3), k),
-        )
+
+        def uneven() -> np.ndarray:
+            if self.picture.scene.textures:
+                return np.ones([size // k for size in shape], bool)
+            return some_of(dilated(edges_of(self.picture, every, shape, self.start, k, creases=True), 3), k)
+
+        return Even(lambda marked: lent_to(self.picture, marked, first, 1), uneven)
 
     def small(self) -> np.ndarray:
         """Image of which all fine pixels are rendered, and those near edges again."""
