@@ -159,9 +159,17 @@ def _around(poses: np.ndarray, limits: tuple[float, float] | None) -> np.ndarray
     """Whether azimuths lie from one to another, growing; at the pole any does."""
     if limits is None:
         return np.ones(len(poses), bool)
-    low, high = limits
-    width = high - low if abs(high - low) == 360 else (high - low) % 360
-    return ((poses[:, 1] - low + 1e-9) % 360 <= abs(width) + 2e-9) | (poses[:, 0] < 1e-9)
+    return ((poses[:, 1] - limits[0] + 1e-9) % 360 <= turn_of(limits) + 2e-9) | (poses[:, 0] < 1e-9)
+
+
+def turn_of(azimuths: tuple[float, float]) -> float:
+    """How far it is from one azimuth to another, growing, degrees; all around between such as are 360 apart.
+
+    >>> turn_of((350, 20)), turn_of((180, -180)), turn_of((7, 7))
+    (30, 360, 0)
+    """
+    low, high = azimuths
+    return 360 if abs(high - low) == 360 else (high - low) % 360
 
 
 def same_side(poses: Iterable[Pose]) -> tuple[float, float]:

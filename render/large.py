@@ -118,12 +118,11 @@ def fine_pixels(
     if renders.random and renders.even is not None:
         seen = renders.even.lent_to(np.ones_like(near) if renders.everywhere else near)
         lent = fine_of(seen, k)
-        if renders.alike and not renders.everywhere:
-            return renders.again(True, fine, close & lent, max(few, many))
+    if renders.random and renders.alike and not renders.everywhere:
+        return renders.again(True, fine, close & lent, max(few, many))
+    if renders.random and renders.even is not None:
         moving = near_required(picture, crop, k, _MOVING)
         fine = with_light_between(renders, renders.even, first, fine, Zones(seen, near, moving), marked, few)
-    elif renders.random and renders.alike and not renders.everywhere:
-        return renders.again(True, fine, close, max(few, many))
     elif renders.random:
         fine = fine_of(renders.whole(True, few), k) if renders.everywhere else fine
         plain, moving = close & ~marked, True

@@ -10,7 +10,7 @@ import numpy as np
 from planner.certifying.cells import Boxes
 from planner.certifying.pulls import is_known
 from planner.certifying.search import LIGHTS, SENSORS, Found, Search
-from planner.constraints import WHOLE, Constraints
+from planner.constraints import WHOLE, Constraints, turn_of
 from planner.planning import Plan
 from planner.search.candidates import RayTraced, SettingUp
 from planner.search.exhaustive import has_bound
@@ -147,8 +147,7 @@ def check_certifiable(found: Plan, limits: Constraints) -> None:
 
 def _has_terms(scene: Scene) -> bool:
     camera, noise = scene.camera, scene.noise
-    lens = not camera.lens.bends and camera.blur_field is None
-    lens &= camera.perspective == 1
+    lens = not camera.lens.bends and camera.blur_field is None and camera.perspective == 1
     plain = noise.colour is None and not noise.is_shared
     light = len(scene.free) == 1 and not any(scene.lights[0].offset)
     return bool(has_bound(scene, "calibrated") and lens and plain and light and is_known(scene))
@@ -158,6 +157,4 @@ def _range(azimuth: tuple[float, float] | None) -> tuple[float, float]:
     """Azimuths from one to another, growing."""
     if azimuth is None:
         return 0.0, 360.0
-    low, high = azimuth
-    width = 360.0 if abs(high - low) == 360 else (high - low) % 360
-    return low, low + width
+    return azimuth[0], azimuth[0] + turn_of(azimuth)

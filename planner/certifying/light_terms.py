@@ -1,7 +1,7 @@
 """What lights of a cell make of the variance, edge by edge: r^6 / K^2, and r^3 (K_1 + K_2) / 2 K^2 of shot noise.
 
 r is the light's distance from a place on the edge, K_1 and K_2 the strengths of both sides, K their difference
-(`imaging.light.appearance.side_strengths`). As polynomials of the place in Bernstein's basis; r^3, which is none, by
+(`imaging.light.edge_sides.side_strengths`). As polynomials of the place in Bernstein's basis; r^3, which is none, by
 what is never more: x^3/2 = 1 + 3/2 z + 3/8 z^2 - 1/16 z^3 + R, x = 1 + z, where R = 3/128 z^4 y^-5/2 of a y between 1
 and x.
 """

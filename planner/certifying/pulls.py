@@ -1,4 +1,4 @@
-"""How quantities on a plane of the part move with places on it, and these with the lines of edges in the image.
+"""How distances on a plane of the part move with corners on it, and these with the lines of edges in the image.
 
 The first is a constant of the part, found by the measurands' own formulas from places that are moved one by one; the
 second depends on the eye.
@@ -7,16 +7,15 @@ second depends on the eye.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.certifying.enclosed import Enclosed
-from scenes import Corner, Edge, Quantity, Scene, Side, Solid
-from scenes.measurands.evaluated import Line, Point
-from scenes.measurands.features import Between, ends_of, outward, plane_of, point_of, points_of
+from scenes import Corner, Edge, Quantity, Scene, Solid
+from scenes.measurands.evaluated import Point
+from scenes.measurands.features import plane_of, point_of, points_of
 from scenes.measurands.kinds import MEASURANDS
-from scenes.viewpoint import Viewpoint
 
 if TYPE_CHECKING:
     from planner.certifying.lines import Line as Image
@@ -33,9 +32,7 @@ class Pull:
     ----------
     place : ndarray, shape (3,)
     edges : tuple of str
-        Whose lines decide where it is found: two of a corner, else one.
-    share : float or None
-        Of an edge's length at which it lies in space: 0, 0.5 or 1; None of a corner.
+        The two whose lines decide where it is found.
     slope : ndarray, shape (3,)
         Derivative of the quantity by the place, its unit for the scene's.
     across : ndarray, shape (3,), or None
@@ -46,7 +43,6 @@ class Pull:
 
     place: np.ndarray
     edges: tuple[str, ...]
-    share: float | None
     slope: np.ndarray
     across: np.ndarray | None
     middle: np.ndarray
@@ -55,16 +51,13 @@ class Pull:
         """Derivative of the quantity by the displacement of an edge's line beside the place, its unit for px, over the
         edge's h.
 
-        On the plane of unit normal N a place moves along b N.w - w N.b where the line of another edge, of direction b,
-        stays; a line that stays alone lets it move across itself.
+        On the plane of unit normal N a place moves along b N.w - w N.b where the line of the other edge, direction b,
+        stays.
         """
         solid, camera = view.scene.solid, view.scene.camera
         own = solid.vertices[edge.ends[1]] - solid.vertices[edge.ends[0]]
         own = own / np.linalg.norm(own)
         over = view.divisor(self.place) / camera.focal_px
-        if self.share is not None:
-            step = np.cross(self.across, own)
-            return over * float(self.slope @ step) / view.from_eye(self.place, np.cross(step, own))
         beside = solid.edge(next(name for name in self.edges if name != edge.name))
         other = solid.vertices[beside.ends[1]] - solid.vertices[beside.ends[0]]
         other = other / np.linalg.norm(other)
@@ -83,18 +76,12 @@ class Pull:
         facing = [view.from_eye(self.middle, row) * view.from_eye(self.place, row) for row in _axes(unit)]
         return view.from_eye(self.place, self.slope) * off / (facing[0] + facing[1])
 
-    def shares(self, line: Image) -> tuple[Enclosed | float, Enclosed | float]:
+    def shares(self, line: Image) -> tuple[float, float]:
         """Of a displacement beside the place the derivatives by those of the edge's ends."""
-        if self.share is None:
-            solid = line.view.scene.solid
-            last = solid.vertices[line.edge.ends[1]]
-            is_last = np.linalg.norm(last - self.place) < 1e-9 * solid.extent
-            return (0.0, 1.0) if is_last else (1.0, 0.0)
-        if self.share == 0.5:
-            near, far = line.divisors  # the image of the middle is nearer to the end that is further away
-            share = near / (near + far)
-            return 1.0 - share, share
-        return 1.0 - self.share, self.share
+        solid = line.view.scene.solid
+        last = solid.vertices[line.edge.ends[1]]
+        is_last = np.linalg.norm(last - self.place) < 1e-9 * solid.extent
+        return (0.0, 1.0) if is_last else (1.0, 0.0)
 
 
 def _axes(unit: np.ndarray) -> np.ndarray:
@@ -103,53 +90,24 @@ def _axes(unit: np.ndarray) -> np.ndarray:
 
 
 class Moved:
-    """Features where an object has them, whose places all move: each by three parameters of its own."""
+    """Corners where an object has them, whose places all move: each by three parameters of its own."""
 
-    def __init__(self, solid: Solid, view: np.ndarray) -> None:
-        self.solid, self.viewpoint = solid, Viewpoint(view, 0.0)
-        self.places: list[tuple[np.ndarray, tuple[str, ...], float | None]] = []
+    def __init__(self, solid: Solid) -> None:
+        self.solid = solid
+        self.places: list[tuple[np.ndarray, tuple[str, ...]]] = []
 
-    def point(self, feature: Any, plane: np.ndarray | None) -> Point:
-        """A corner, or what lies between others."""
-        if isinstance(feature, Between):
-            return feature.made(self, plane)
-        return self._moving(point_of(self.solid, feature), feature.edges, None)
-
-    def line(self, feature: Any, plane: np.ndarray | None) -> Line:
-        """Of an edge, or between others."""
-        if isinstance(feature, Between):
-            return feature.made(self, plane)
-        start, stop = ends_of(self.solid, feature)
-        return Line(self._moving(start, (feature.edge,), 0.0), self._moving(stop, (feature.edge,), 1.0))
-
-    def middle(self, feature: Side, plane: np.ndarray | None) -> Point:
-        """Of an edge."""
-        return self._moving(ends_of(self.solid, feature).mean(0), (feature.edge,), 0.5)
-
-    def left(self, parts: tuple, plane: np.ndarray) -> float:
-        """As of the object itself."""
-        return float(np.sign(outward(plane) @ plane))
-
-    def _moving(self, place: np.ndarray, edges: tuple[str, ...], share: float | None) -> Point:
-        self.places.append((place, tuple(edges), share))
+    def point(self, feature: Corner, plane: np.ndarray | None) -> Point:
+        """A corner."""
+        self.places.append((point_of(self.solid, feature), tuple(feature.edges)))
         first = 3 * (len(self.places) - 1)
-        return Point(place, {first + k: row for k, row in enumerate(np.eye(3))})
+        return Point(self.places[-1][0], {first + k: row for k, row in enumerate(np.eye(3))})
 
 
 def pulls_of(scene: Scene, quantity: Quantity) -> list[Pull]:
-    """How a quantity of straight edges moves with the places of its features.
-
-    Raises
-    ------
-    TypeError
-        If it is of a kind whose derivatives are not told by moved corners and edges.
-    """
+    """How a distance of corners moves with their places."""
     across, points = plane_of(scene.solid, quantity), points_of(scene.solid, quantity)
-    view = across
-    if view is None:  # square to the way between both points, which every such plane holds
-        view = np.linalg.svd((points[1] - points[0])[None])[2][2]
-    moved = Moved(scene.solid, view)
-    told = MEASURANDS[quantity.kind].evaluated(moved, quantity, view)
+    moved = Moved(scene.solid)
+    told = MEASURANDS[quantity.kind].evaluated(moved, quantity, across)
     rows = np.zeros(3 * len(moved.places))
     for number, slope in told.gradient.items():
         rows[number] = float(slope)
@@ -166,5 +124,7 @@ def pulls_of(scene: Scene, quantity: Quantity) -> list[Pull]:
 
 def is_known(scene: Scene) -> bool:
     """Whether all quantities are distances of corners: those of which bounds have been shown to hold."""
-    kinds = all(each.kind == "distance" for each in scene.quantities)
-    return kinds and all(isinstance(feature, Corner | Side) for feature in scene.features)
+    return all(
+        each.kind == "distance" and all(isinstance(feature, Corner) for feature in each.features)
+        for each in scene.quantities
+    )
