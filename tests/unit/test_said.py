@@ -140,14 +140,17 @@ def test_names_are_wrapped():
 def test_an_intrinsic_has_two_digits_of_its_deviation():
     """Four decimals where it has none."""
     found = SimpleNamespace(
-        names=("fx", "cy", "k1", "p1"), values=[1203.45678, 480.0, -0.123456789, 7.0], sd=[0.21, 12.0, 0.00034, 0.0]
+        names=("fx", "cy", "k1", "p1"),
+        values=[1203.45678, 480.0, -0.123456789, 7.0],
+        sd=[0.21, 12.0, 0.00034, 0.0],
+        is_splined=False,
     )
     rows = list(zip(*(column.cells for column in camera_table.parameters(found).columns), strict=True))
     assert rows == [
         ("fx", "1203.46", "0.21", "px"), ("cy", "480", "12", "px"), ("k1", "-0.12346", "0.00034", ""),
         ("p1", "7.0000", "0", ""),
     ]  # fmt: skip
-    wide = SimpleNamespace(names=("fy",), values=[1203.45678], sd=[math.inf])
+    wide = SimpleNamespace(names=("fy",), values=[1203.45678], sd=[math.inf], is_splined=False)
     assert next(iter(camera_table.parameters(wide).columns[1].cells)) == "1203.4568"
 
 
