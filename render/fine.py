@@ -144,7 +144,8 @@ class _Tracer:
         """Rays of a fine pixel that an edge crosses."""
         interpreted = self.scalar and self.active & CUSTOM and (self.textures is None or self.random)
         plain = self.scalar and (self.textures is None or not self.active & CUSTOM)
-        return self.quality.edge_samples or (16 if interpreted else 64 if plain else 256)
+        rays = self.quality.edge_samples or (16 if interpreted else 64 if plain else 256)
+        return rays * self.quality.denser**2 if self.random else rays
 
     @property
     def ordinary(self) -> int:
@@ -156,7 +157,7 @@ class _Tracer:
     @property
     def few(self) -> int:
         """Rays of a fine pixel where they are random and no edge crosses it."""
-        return self.quality.random_samples or (4 if self.quiet else 16)
+        return (self.quality.random_samples or (4 if self.quiet else 16)) * self.quality.denser**2
 
     @property
     def is_large(self) -> bool:
@@ -296,7 +297,7 @@ class _Tracer:
         else:
             fine = refine(loaded, self.rays, fine, everywhere, self.few)
         if self.quiet:
-            fine = self.again(loaded, self.active, fine, near & ~marked, min(_NEAR, self.many))
+            fine = self.again(loaded, self.active, fine, near & ~marked, min(_NEAR * self.quality.denser**2, self.many))
         else:
             marked |= near
         return self.again(loaded, self.active, fine, marked, self.many)

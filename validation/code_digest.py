@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 
-def digest(packages: tuple[ModuleType, ...], modules: tuple[ModuleType, ...]) -> bytes:
+def digest(packages: tuple[ModuleType, ...], modules: tuple[ModuleType, ...] = ()) -> bytes:
     """SHA-256 of all that packages hold, and of single modules, in order."""
     folders = [Path(str(package.__file__)).parent for package in packages]
     files = [file for folder in folders for file in sorted(folder.rglob("*.py"))]

@@ -32,7 +32,7 @@ from measure.adjustment import Adjusted, Adjustment
 from render import variant as variants
 from scenes import ImageTexture, Picture
 from scenes.status import ALL
-from validation import dimmed, simulation
+from validation import simulation
 from validation.code_digest import digest
 from validation.remeasured import Method
 from validation.simulation import How
@@ -171,7 +171,7 @@ def _digest(picture: Picture, method: Method, how: How) -> str:
 @functools.cache
 def _code() -> bytes:
     """Digest of the code that makes the numbers."""
-    return digest((scenes, imaging, render, measure), (dimmed, simulation))
+    return digest((scenes, imaging, render, measure, simulation))
 
 
 def _read(file: Path, picture: Picture, method: Method) -> Correction | None:

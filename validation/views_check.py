@@ -147,7 +147,7 @@ def _key(view: planner.View) -> tuple[Pose, Pose]:
 def _shot(picture: Picture, repeats: int, images: int, seed: tuple[int, int], quality: Quality) -> _Shot:
     rng, how = np.random.default_rng(seed), simulation.How(quality)
     renders = simulation.steadied(picture, how.image(picture), GRADIENT, how)
-    clean = simulation.mean_of(picture, renders)
+    clean = renders.mean(picture)
     known = measure.propagate(clean, picture, estimator=GRADIENT.locator).measurands
     (off,) = simulation.independent(picture, (GRADIENT,), renders, (known,), how)
     size, where = max(1, _PIXELS // clean.size), measure.region_of_interest(picture, estimators=(GRADIENT.locator,))

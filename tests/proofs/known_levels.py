@@ -34,9 +34,9 @@ from measure.features.layout import Layout
 from measure.features.optics import Optics
 from scenes import Picture, status
 from tests.proofs.bias import deviating, moved, rms
-from validation import simulation
 from validation.remeasured import Method
 from validation.simulation import How
+from validation.simulation.images import completed, of_all
 
 NAME = "known levels"
 _OWN = 3.0  # px beside an edge that are its own, whatever else is near
@@ -166,8 +166,8 @@ def images_of(picture: Picture) -> Images:
     """Two renders of few rays, and with each input changed by a standard uncertainty."""
     how = How().by(Method("strip"))
     renders = tuple(how.rough.image(picture, seed) for seed in range(2))
-    images = simulation._completed(picture, renders, (), how)
-    return replace(images, overall=simulation._overall(picture, images, how))
+    images = completed(picture, renders, (), how)
+    return replace(images, overall=of_all(picture, images, how))
 
 
 def corrections(picture: Picture, images: Images) -> dict[str, measure.Correction]:

@@ -16,6 +16,7 @@ from tests.oracle import block_image
 from validation import kept, picture_file, simulation
 from validation.remeasured import Method
 from validation.report import budget_table
+from validation.simulation import corrections, inputs
 
 ESTIMATORS = ("gradient", "isophote", "canny", "strip", "arrangement")
 
@@ -188,7 +189,7 @@ def test_what_is_not_signed_says_how_large_the_bias_may_be(small_task1):
 def test_lights_stand_a_step_beside():
     """Both directions are a degree away and across each other, at the pole, too (spherical cosine rule by hand)."""
     for pose in (Pose(40, 30), Pose(0, 10), Pose(180, 0), Pose(179.9, 300)):
-        places = [_unit(each) for each in (pose, *simulation._beside(pose, 1.0))]
+        places = [_unit(each) for each in (pose, *inputs._beside(pose, 1.0))]
         here, along, across = places
         for other in (along, across):
             assert np.degrees(np.arccos(np.clip(here @ other, -1, 1))) == pytest.approx(1.0, rel=0.02)
@@ -255,7 +256,7 @@ def test_rays_are_added_until_their_noise_does_not_matter(
         return exact + (rough if is_rough else fine) * noise
 
     monkeypatch.setattr(simulation.How, "_rendered", made)
-    found, _ = simulation._until_quiet(picture, Method("gradient"), simulation.How())
+    found, _ = corrections._until_quiet(picture, Method("gradient"), simulation.How())
     assert found.renders == renders
     assert (asked.count(True), asked.count(False)) == (few, all_)
 

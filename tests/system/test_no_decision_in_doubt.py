@@ -117,7 +117,7 @@ def test_nothing_is_decided_or_signed_where_the_bias_is_not_known(name, folder, 
     monkeypatch.setattr(kept, "correction", lambda picture, method, how=None: made(picture, method))
     monkeypatch.setattr(
         work.simulation, "independent",
-        lambda picture, methods, renders, *_: tuple(made(picture, method, renders[0]) for method in methods),
+        lambda picture, methods, renders, *_: tuple(made(picture, method, renders.whole) for method in methods),
     )  # fmt: skip
     monkeypatch.setattr(
         plan_check.simulation, "of_render", lambda picture, method, image, *_: made(picture, method, image)

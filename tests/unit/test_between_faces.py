@@ -15,8 +15,8 @@ from render.between import lent_to
 from scenes import Picture, Scene
 from tests.parts import newcomers
 from tests.step_parts import flange, written
-from validation import dimmed
-from validation.dimmed import of_one_surface
+from validation.simulation import dimmed
+from validation.simulation.dimmed import of_one_surface
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_one_surface_reflects_less_by_what_its_light_has_met(picture, monkeypatc
         asked.append(len(points))
         return np.full(len(points), 8.0), np.full(len(points), 0.7 * 8.0)
 
-    monkeypatch.setattr("validation.dimmed.light_of_dimmed", told)
+    monkeypatch.setattr("validation.simulation.dimmed.light_of_dimmed", told)
     found = of_one_surface(picture, (render,), lambda: direct, 0.1)
     assert found[~inner] == pytest.approx(render[~inner] - 5.0)
     assert found[near] == pytest.approx(render[near] - 5.0 - 0.3 * 8.0, abs=1e-6)

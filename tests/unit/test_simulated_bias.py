@@ -21,7 +21,9 @@ from scenes.status import allowed
 from tests.oracle import block_image
 from validation import kept, simulation
 from validation.remeasured import Method
-from validation.simulation import How
+from validation.simulation import How, corrections, inputs, proof
+from validation.simulation import how as ways
+from validation.simulation import images as imagery
 
 POSES = (30, 90), (15, 270)
 ROUGH = Images((np.zeros((2, 2)),))
@@ -220,14 +222,14 @@ def test_renders_are_enough_when_every_value_s_noise_is_a_tenth_of_sigma_or_a_hu
         picture, quantities=(quantity,) * 2, sources={"rendering": np.array(noise)},
         covariance=np.diag(np.square(sigma)), bias=np.zeros(2),
     )  # fmt: skip
-    assert simulation._is_quiet(made) is quiet
+    assert corrections._is_quiet(made) is quiet
 
 
 def test_lights_are_moved_one_at_a_time():
     """Each a hundredth of its distance away, and by as much to the side; all else stays."""
     scene = scenes.load("two_lights").with_(uncertainty={"light_place": 0.01})
     picture = Picture.of(scene, (60, 277), [(75, 280), (45, 276)])
-    moved, seen = list(simulation._with_lights_moved(picture)), []
+    moved, seen = list(inputs.with_lights_moved(picture)), []
     for each in moved:
         far = [b.distance / a.distance for a, b in zip(scene.lights, each.scene.lights, strict=True)]
         turned = [_angle(a, b) for a, b in zip(picture.lights, each.lights, strict=True)]
@@ -258,7 +260,7 @@ def test_each_surface_reflects_less_by_a_tenth():
     def reflected(each):
         return each.material.specular_fraction, each.floor.reflectance, each.materials[0].diffuse_reflectance
 
-    found = [np.divide(reflected(each.scene), reflected(scene)) for each in simulation._of_other_surfaces(picture)]
+    found = [np.divide(reflected(each.scene), reflected(scene)) for each in inputs.of_other_surfaces(picture)]
     assert np.array(found) == pytest.approx(np.array([[0.9, 1, 1], [1, 0.9, 1], [1, 1, 0.9]]))
     assert scene.floor.reflectance == 0.2
 
@@ -267,19 +269,19 @@ def test_the_light_in_closed_form_is_what_exact_images_show(task1):
     """The value is measured in an exact image for each other place of the light; a place farther away changes none."""
     scene, values = task1.with_(uncertainty={"light_place": 0.05}), []
     picture = Picture.of(scene, (30, 135), (15, 315))
-    for each in (picture, *simulation._with_lights_moved(picture)):
+    for each in (picture, *inputs.with_lights_moved(picture)):
         image = block_image(scene, (30, 135), tuple(each.lights[0]))
         found = measure.measure(image, picture, estimator="gradient")
         values.append((found.value[0], found.first.value_px))
     expected = np.linalg.norm(np.array(values[1:]) - values[0], axis=0)
-    told = np.concatenate(simulation._light_in_closed_form(picture, How().by(Method("gradient"))))
+    told = np.concatenate(inputs.light_in_closed_form(picture, How().by(Method("gradient"))))
     assert told == pytest.approx(expected, rel=0.6)  # margin: differences of 1e-4 px of a form of first order
 
 
 @pytest.mark.parametrize("estimators", [("arrangement",), ("strip",), ("gradient", "arrangement")])
 def test_the_light_in_closed_form_is_that_of_locators_whose_bias_it_is(estimators, task1):
     picture = Picture.of(task1, (30, 135), (15, 315))
-    assert simulation._light_in_closed_form(picture, How().by(*map(Method, estimators))) is None
+    assert inputs.light_in_closed_form(picture, How().by(*map(Method, estimators))) is None
 
 
 @pytest.mark.render
@@ -297,42 +299,53 @@ class _Rendered(How):
     """A way to make images that are told apart by the seed alone, and that notes what was asked for."""
 
     def image(self, picture, seed=0):
-        return np.full((picture.scene.camera.height, picture.scene.camera.width), float(seed))
+        more = 1000 * (self.quality.denser - 1)
+        return np.full((picture.scene.camera.height, picture.scene.camera.width), float(seed + more))
 
     def active(self, picture):
         return frozenset({"interreflection"})
 
 
 @pytest.mark.parametrize(
-    ("noise", "count"), [(0.05, 1), (0.0706, 1), (0.0709, 2), (0.15, 5), (9.0, 6), (np.inf, 1)]
+    ("noise", "finer", "count"),
+    [(0.0699, None, 1), (0.0701, 0.03, 1), (0.3, 0.0701, 2), (0.3, 0.15, 5), (9.0, 9.0, 6), (np.inf, None, 1)],
 )  # fmt: skip
-def test_as_many_renders_are_measured_as_make_their_noise_a_tenth_of_sigma(picture, noise, count, monkeypatch):
-    """The noise of one is the square root of two times that of the mean of two; the worst value counts, six at most."""
+def test_as_many_renders_are_measured_as_make_what_is_left_quiet(picture, noise, finer, count, monkeypatch):
+    """Finer ones where a pair is noisy; the worst value counts, six at most; others of as many tell their biases."""
     asked = []
 
     def correction(images, *given):
+        told = [noise, finer][len(asked)] / np.sqrt(2)  # of the mean of two
         asked.append(images)
-        return _made(picture, sources={"rendering": np.array([0.01, noise])}, covariance=np.eye(2), bias=np.zeros(2))
+        return _made(picture, sources={"rendering": np.array([0.01, told])}, covariance=np.eye(2), bias=np.zeros(2))
 
-    monkeypatch.setattr(simulation.measure, "correction", correction)
-    found = simulation.steadied(picture, np.zeros((2, 2)), Method("gradient"), _Rendered())
-    assert [each.flat[0] for each in found] == [0, *range(1000, 999 + count)]
-    assert [each.flat[0] for each in asked[0].renders] == [0, 1000]
+    monkeypatch.setattr(measure, "correction", correction)
+    whole = np.full((2, 2), 0.5)
+    found = simulation.steadied(picture, whole, Method("gradient"), _Rendered())
+    assert found.whole is whole
+    if finer is None:
+        assert (len(asked), found.measured, found.others[0].flat[0]) == (1, (whole,), 1)
+        return
+    assert [each.flat[0] for each in found.measured] == [2000 + i for i in range(count)]
+    assert [each.flat[0] for each in found.others] == [1001 + i for i in range(count)]
+    assert [[each.flat[0] for each in pair.renders] for pair in asked] == [[0.5, 1], [2000, 1001]]
 
 
 def test_an_image_without_random_light_is_measured_as_it_is(picture, monkeypatch):
     monkeypatch.setattr(_Rendered, "active", lambda how, picture: frozenset({"shadows"}))
-    monkeypatch.setattr(simulation.measure, "correction", None)
-    assert len(simulation.steadied(picture, np.zeros((2, 2)), Method("gradient"), _Rendered())) == 1
+    monkeypatch.setattr(measure, "correction", None)
+    found = simulation.steadied(picture, whole := np.zeros((2, 2)), Method("gradient"), _Rendered())
+    assert found.measured == (whole,)
+    assert found.mean(picture) is whole
+    assert [each.flat[0] for each in found.others] == [1]
 
 
 def test_a_mean_of_renders_is_taken_where_something_is_measured(picture):
-    """Elsewhere the first is kept; of one there is nothing to take."""
+    """Elsewhere the whole image is kept."""
     height, width = picture.scene.camera.height, picture.scene.camera.width
-    renders = tuple(np.full((height, width), level) for level in (10.0, 16.0, 19.0))
-    mean = simulation.mean_of(picture, renders)
+    whole, *some = (np.full((height, width), level) for level in (10.0, 14.0, 16.0))
+    mean = simulation.Renders(whole, tuple(some), ()).mean(picture)
     assert set(np.unique(mean)) == {10.0, 15.0}
-    assert simulation.mean_of(picture, renders[:1]) is renders[0]
     ends = picture.scene.solid.vertices[[v for e in ("e4", "e9") for v in picture.scene.solid.edge(e).ends]]
     at = np.rint(project(ends.reshape(2, 2, 3).mean(1), np.array(list(picture.sensor)), picture.scene.camera)).astype(
         int
@@ -344,17 +357,15 @@ def test_a_mean_of_renders_is_taken_where_something_is_measured(picture):
 def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture, monkeypatch):
     """For each method, with what propagation says of it; those that are measured tell their own noise beside."""
     asked = []
-    monkeypatch.setattr(simulation.measure, "correction", lambda *given: asked.append(given) or len(asked))
-    monkeypatch.setattr(simulation, "_completed", lambda *given: given)
-    monkeypatch.setattr(simulation, "_sure", lambda picture, found, *more: found)
-    measured = tuple(np.full((2, 2), -float(i)) for i in range(3))
-    methods = Method("strip", None), Method("isophote", 0.4)
-    how = _Rendered()
-    assert simulation.independent(picture, methods, measured, ("one", "two"), how) == (1, 2)
+    monkeypatch.setattr(measure, "correction", lambda *given: asked.append(given) or len(asked))
+    monkeypatch.setattr(proof, "completed", lambda *given: given)
+    monkeypatch.setattr(proof, "sure", lambda picture, found, *more: found)
+    measured, others = ((np.full((2, 2), sign * float(i)) for i in range(1, 4)) for sign in (-1, 1))
+    renders = simulation.Renders(np.zeros((2, 2)), tuple(measured), tuple(others))
+    methods, how = (Method("strip", None), Method("isophote", 0.4)), _Rendered()
+    assert simulation.independent(picture, methods, renders, ("one", "two"), how) == (1, 2)
     assert [(given[2], given[3], given[4]) for given in asked] == [("strip", None, "one"), ("isophote", 0.4, "two")]
-    of, renders, beside, *made = asked[0][0]
-    assert (of, beside, made) == (picture, measured, [how.by(*methods)])
-    assert [each.flat[0] for each in renders] == [1, 2, 3]
+    assert asked[0][0] == (picture, renders.others, renders.measured, how.by(*methods))
 
 
 def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u(small_task1, monkeypatch):
@@ -366,11 +377,11 @@ def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u
         told = measure.propagate(block_image(small_task1, *POSES), picture, estimator=method.locator)
         return _made(picture), told.measurands
 
-    monkeypatch.setattr(simulation, "_until_quiet", quiet)
+    monkeypatch.setattr(corrections, "_until_quiet", quiet)
     grain = {"kind": "statistical", "where": "top", "contrast": 0.1, "correlation": 0.3}
     scene = small_task1.with_(textures=[grain])
     picture, how = Picture.of(scene, *POSES), How()
-    found = simulation._simulated.__wrapped__(picture, Method("gradient"), how)
+    found = corrections._simulated.__wrapped__(picture, Method("gradient"), how)
     spread = texture_errors(Pictures.of(picture)).variances
     assert asked[0].scene.textures == ()
     # margin: the closed form is of the first order, and has no corners
@@ -378,7 +389,7 @@ def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u
         (spread[1][0] ** 0.5, spread[0][0] ** 0.5), rel=0.1
     )
     assert found.sources["rendering"].tolist() == [0.03]
-    plain = simulation._simulated.__wrapped__(Picture.of(small_task1, *POSES), Method("gradient"), how)
+    plain = corrections._simulated.__wrapped__(Picture.of(small_task1, *POSES), Method("gradient"), how)
     assert "texture" not in plain.sources
 
 
@@ -387,10 +398,10 @@ def test_a_material_that_cannot_tell_how_it_reflects_less_leaves_the_bias_unknow
     for name, plain in (("bracket", False), ("task1", True)):
         scene = scenes.load(name)
         picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
-        assert simulation._of_unknown_kinds(picture) == {}
+        assert inputs.of_unknown_kinds(picture) == {}
         with monkeypatch.context() as changed:
             changed.setattr(type(scene.material), "dimmed", lambda *given: None)
-            found = simulation._of_unknown_kinds(picture)
+            found = inputs.of_unknown_kinds(picture)
         assert (found == {}) == plain
         if not plain:
             assert [each.tolist() for each in found["reflectance"]] == [[np.inf] * len(scene.quantities)] * 2
@@ -418,10 +429,10 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
     camera = picture.scene.camera.model_copy(update=size)
     large = picture.with_scene(picture.scene.model_copy(update={"camera": camera}))
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
-    monkeypatch.setattr(simulation, "_completed", lambda picture, renders, *given: asked.append(renders))
-    monkeypatch.setattr(simulation.measure, "correction", lambda *given: _made(picture, sources=quiet))
-    monkeypatch.setattr(simulation.measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
-    found, told = simulation._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
+    monkeypatch.setattr(corrections, "completed", lambda picture, renders, *given: asked.append(renders))
+    monkeypatch.setattr(measure, "correction", lambda *given: _made(picture, sources=quiet))
+    monkeypatch.setattr(measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
+    found, told = corrections._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
     assert told == (count - 1) / 2  # of the renders' mean
     assert found.sources["rendering"].tolist() == [0.01]
     assert asked == [tuple(range(count))]
@@ -441,10 +452,10 @@ def test_what_is_compared_is_rendered_once(monkeypatch, below):
         return np.full((2, 2), 50.0 + len(asked))
 
     monkeypatch.setattr(How, "_rendered", rendered)
-    monkeypatch.setattr(simulation, "of_one_surface", lambda picture, renders, direct, part: renders[0] - direct())
-    monkeypatch.setattr(simulation, "LARGE", 1 << 20 if below else 1)
+    monkeypatch.setattr(imagery, "of_one_surface", lambda picture, renders, direct, part: renders[0] - direct())
+    monkeypatch.setattr(imagery, "LARGE", 1 << 20 if below else 1)
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
-    images = simulation._completed(picture, (np.full((2, 2), 77.0),), (), How())
+    images = imagery.completed(picture, (np.full((2, 2), 77.0),), (), How())
     assert [each[1:] for each in asked] == [(True, below)] * (4 + below)
     assert [shown is picture for shown, *_ in asked].count(True) == 1
     assert len({shown for shown, *_ in asked}) == 4 + below
@@ -467,8 +478,8 @@ def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
 
     monkeypatch.setattr(How, "_rendered", rendered)
     how = How(quality=Quality(seed=7))
-    images = simulation._completed(picture, (np.full((2, 2), dark + 100.0),), (), how)
-    settled = simulation._settled(picture, images, how)
+    images = imagery.completed(picture, (np.full((2, 2), dark + 100.0),), (), how)
+    settled = imagery.settled(picture, images, how)
     assert sorted(seeds) == sorted(5 * [7, 8, 9, 10])
     assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 1, "light_place": 3}
     for some, first in zip(settled.changed.values(), images.changed.values(), strict=True):
@@ -488,13 +499,13 @@ def test_more_is_rendered_where_a_bias_is_not_known_well_enough(picture, u, belo
     sources = {"rendering": np.array([0.0]), "light_place": np.array([u * limit])}
     doubtful = dataclasses.replace(made, sources=sources, simulated=("clutter",))
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
-    monkeypatch.setattr(simulation, "LARGE", 1 << 20 if below else 1)
-    monkeypatch.setattr(simulation, "_completed", lambda *given: ROUGH)
-    monkeypatch.setattr(simulation, "_overall", lambda *given: done.append("overall"))
-    monkeypatch.setattr(simulation, "_settled", lambda *given: done.append("settled") or ROUGH)
-    monkeypatch.setattr(simulation.measure, "correction", lambda *given: doubtful)
-    monkeypatch.setattr(simulation.measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
-    simulation._until_quiet(picture, Method("gradient"), _Rendered())
+    monkeypatch.setattr(corrections, "LARGE", 1 << 20 if below else 1)
+    monkeypatch.setattr(corrections, "completed", lambda *given: ROUGH)
+    monkeypatch.setattr(corrections, "of_all", lambda *given: done.append("overall"))
+    monkeypatch.setattr(corrections, "settled", lambda *given: done.append("settled") or ROUGH)
+    monkeypatch.setattr(measure, "correction", lambda *given: doubtful)
+    monkeypatch.setattr(measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
+    corrections._until_quiet(picture, Method("gradient"), _Rendered())
     assert done == asked
 
 
@@ -504,12 +515,12 @@ def test_methods_that_are_judged_together_share_what_settles_them(picture, monke
     doubtful, sure = (
         _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])}) for u in (9.0, 0.1)
     )
-    monkeypatch.setattr(How, "image", lambda how, picture, seed=0: seed)
-    monkeypatch.setattr(simulation, "_completed", lambda *given: ROUGH)
-    monkeypatch.setattr(simulation, "_overall", lambda *given: made.append("overall"))
-    monkeypatch.setattr(simulation, "_settled", lambda *given: made.append("settled") or fine)
-    monkeypatch.setattr(simulation.measure, "correction", lambda images, *given: sure if images.known else doubtful)
-    told = simulation.independent(picture, (Method("gradient"), Method("canny")), ("image",), (None, None))
+    monkeypatch.setattr(proof, "completed", lambda *given: ROUGH)
+    monkeypatch.setattr(corrections, "of_all", lambda *given: made.append("overall"))
+    monkeypatch.setattr(corrections, "settled", lambda *given: made.append("settled") or fine)
+    monkeypatch.setattr(measure, "correction", lambda images, *given: sure if images.known else doubtful)
+    renders = simulation.Renders("image", ("image",), ("other",))
+    told = simulation.independent(picture, (Method("gradient"), Method("canny")), renders, (None, None))
     assert told == (sure, sure)
     assert made == ["overall", "settled"]
 
@@ -517,7 +528,7 @@ def test_methods_that_are_judged_together_share_what_settles_them(picture, monke
 @pytest.mark.parametrize(("below", "fine"), [(True, 4), (False, 2)])
 def test_what_is_compared_has_finer_pixels_up_to_a_megapixel(picture, below, fine, monkeypatch):
     """The edge of a shadow moves in steps of a fine pixel where a light does."""
-    monkeypatch.setattr(simulation, "LARGE", 1 << 20 if below else 1)
+    monkeypatch.setattr(ways, "LARGE", 1 << 20 if below else 1)
     quality = How(quality=Quality(seed=3)).compared(picture).quality
     assert (quality.supersample, quality.seed, quality.alike) == (fine, 3, True)
 
@@ -525,7 +536,7 @@ def test_what_is_compared_has_finer_pixels_up_to_a_megapixel(picture, below, fin
 def test_what_few_rays_tell_of_all_levels_moves_no_edge():
     """An edge that few rays show aside: of a picture that is a tenth darker the image is, too; a spot of 5 is one."""
     first, here = np.array([[100.0, 100.0, 20.0, 20.0]]), np.array([[100.0, 70.0, 20.0, 20.0]])
-    assert simulation._changed(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
+    assert imagery._changed(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
     with_spot = first + np.array([[0.0, 0.0, 0.0, 5.0]])
-    assert simulation._changed(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
-    assert simulation._changed(first, 0 * here, 0 * here).tolist() == [[0.0] * 4]
+    assert imagery._changed(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
+    assert imagery._changed(first, 0 * here, 0 * here).tolist() == [[0.0] * 4]

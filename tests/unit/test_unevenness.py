@@ -11,12 +11,13 @@ from imaging.pictures import Pictures
 from measure.unevenness import Unevenness
 from scenes import Picture, StatisticalTexture
 from validation import simulation
+from validation.simulation import corrections
 
 SENSOR, LIGHT = (30, 135), (15, 315)
 
 
 def _even(picture):
-    return picture.with_scene(simulation._without_textures(picture.scene))
+    return picture.with_scene(corrections._without_textures(picture.scene))
 
 
 def _propagated(picture, estimator):

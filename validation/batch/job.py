@@ -21,7 +21,7 @@ import scenes
 from render import EffectTolerance, Quality
 from render import variant as variants
 from scenes import InvalidInput, Scene
-from validation import dimmed, remeasured, simulation
+from validation import remeasured, simulation
 from validation.batch import cluster, machine, photographs, work
 from validation.batch import pool as pools
 from validation.batch.campaign import Campaign
@@ -180,8 +180,8 @@ def _identity(
 
 def _code() -> str:
     """Digest of the code that makes the numbers."""
-    modules = work, photographs, remeasured, dimmed, simulation
-    return digest((scenes, imaging, planner, render, measure), modules).hex()[:16]
+    packages = scenes, imaging, planner, render, measure, simulation
+    return digest(packages, (work, photographs, remeasured)).hex()[:16]
 
 
 def _note_machine(store: RunFile) -> None:

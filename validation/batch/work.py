@@ -226,14 +226,14 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     numbers |= measurands.texture(predicted["calibrated"].measurands[0].texture_variance_image)
     numbers["measurands"] = measurands.predicted(predicted, biased)
     clock.lap("predict")
-    renders: tuple[np.ndarray, ...] = ()
+    renders = None
     used = methods(scene)
     way = simulation.How(how.quality, variant, how.effects, how.tolerance).by(*used)
     photographed = image is not None
     if not photographed:
         image = render.image(picture, variant=variant, **vars(how))
         renders = simulation.steadied(picture, image, used[0], way)
-        image = simulation.mean_of(picture, renders)
+        image = renders.mean(picture)
         clock.lap("render")
     shaken = scene.model_copy(update={"jitter": _jitter(case, how)})
     spread = planner.pose_scatter(shaken, np.array([list(picture.sensor)]))
@@ -243,7 +243,7 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     ]
     clock.lap("propagate")
     off: tuple[Correction, ...] = ()
-    if not photographed:
+    if renders is not None:
         off = simulation.independent(picture, used, renders, tuple(each.measurands for each in found), way)
         _note_corrections(numbers, used, off)
         clock.lap("correct")

@@ -1,0 +1,88 @@
+"""How noise-free images are made that tell the bias of a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import measure
+import render
+from render import EffectTolerance, Quality
+from render import variant as variants
+from render.large import LARGE
+from scenes import Picture
+from validation.remeasured import Method
+
+BETWEEN = "interreflection"
+_DENSER = 2  # times more rays, each way, where single ones are random
+_FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
+_ALIKE = {"samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
+_FINE, _COARSE = 4, 2  # fine pixels a pixel, each way, of images that are compared, up to a megapixel and above
+
+
+@dataclass(frozen=True)
+class How:
+    """How noise-free images are made: as `render.image` takes it, and whether where nothing is measured, too.
+
+    ``predicted``: whether the closed form of the bias is that of whatever measures in them.
+    """
+
+    quality: Quality = Quality()
+    variant: str | None = None
+    effects: str = "auto"
+    tolerance: EffectTolerance = EffectTolerance()
+    everywhere: bool = False
+    predicted: bool = False
+
+    def by(self, *methods: Method) -> How:
+        """Everywhere, if one of the methods looks at more than the surroundings of what is measured."""
+        kinds = [measure.ESTIMATORS[each.locator] for each in methods]
+        return replace(
+            self,
+            everywhere=not all(each.local for each in kinds),
+            predicted=all(each.bias_predicted for each in kinds),
+        )
+
+    @property
+    def rough(self) -> How:
+        """With few rays."""
+        return replace(self, quality=replace(self.quality, **_FEW))
+
+    def compared(self, picture: Picture) -> How:
+        """With few rays, the same ones of all pictures from one place: their differences are told, not they.
+
+        Beside an edge they have to tell where a shadow ends, which in a coarse grid moves in steps.
+        """
+        fine = _FINE if is_below(picture, LARGE) else _COARSE
+        return replace(self, quality=replace(self.quality, supersample=fine, **_ALIKE))
+
+    @property
+    def finer(self) -> How:
+        """With four times the rays where single ones are random."""
+        return replace(self, quality=replace(self.quality, denser=_DENSER * self.quality.denser))
+
+    @property
+    def by_pixel(self) -> bool:
+        """Whether rays are random pixel by pixel: in compiled variants all fine pixels share one table."""
+        return (self.variant or variants.choose()).startswith("scalar")
+
+    def image(self, picture: Picture, seed: int = 0) -> np.ndarray:
+        """With rays of another seed, counted from the quality's."""
+        return self._rendered(picture, self.effects, seed)
+
+    def active(self, picture: Picture) -> frozenset[str]:
+        """The effects that are simulated."""
+        return render.choose(picture.scene, self.effects, self.tolerance, picture).active
+
+    def direct(self, picture: Picture, active: frozenset[str]) -> np.ndarray:
+        """Without light between faces."""
+        return self._rendered(picture, active - {BETWEEN}, 0)
+
+    def _rendered(self, picture: Picture, effects: str | frozenset[str], seed: int) -> np.ndarray:
+        quality = replace(self.quality, seed=self.quality.seed + seed, everywhere=self.everywhere)
+        return render.image(picture, None, None, quality, self.variant, effects, self.tolerance)
+
+
+def is_below(picture: Picture, pixels: int) -> bool:
+    return picture.scene.camera.width * picture.scene.camera.height <= pixels

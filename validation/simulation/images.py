@@ -1,0 +1,121 @@
+"""Images, beside renders of a picture, of what its scene is not sure of.
+
+Reflectances change what light does between faces, and contrasts: each is rendered reflecting less, with few rays, and
+subtracted from the same render of the scene as it is. In images above a megapixel, where that takes long, what one
+material does is told by the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered
+so, too, in large images their direct light alone; of plain scenes the closed form of the bias tells what lights do. Two
+renders that are compared have the same rays, one by one, or their difference would be noise; and what makes a picture
+brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from measure import Images
+from render.build import MANY_WAYS
+from render.large import LARGE
+from scenes import Picture
+from validation.simulation.dimmed import of_one_surface
+from validation.simulation.how import BETWEEN, How, is_below
+from validation.simulation.inputs import (
+    LIGHT,
+    REFLECTANCE,
+    light_in_closed_form,
+    lines_by_lights,
+    of_other_surfaces,
+    of_unknown_kinds,
+    u_of,
+    with_lights_moved,
+)
+
+_SETS = 4  # of rays that tell what changes a bias that is not known well enough
+_OVERALL = {"supersample": 1, "samples": 1, "edge_samples": 4, "random_samples": 16}
+_LEVELS = 64  # random samples of the image that a picture is compared with
+
+
+def completed(
+    picture: Picture,
+    renders: tuple[np.ndarray, ...],
+    beside: tuple[np.ndarray, ...],
+    how: How,
+) -> Images:
+    """With the images, or numbers, of what the scene is not sure of."""
+    first, known, alike, active = renders[0], of_unknown_kinds(picture), how.compared(picture), how.active(picture)
+    lines: dict[str, np.ndarray] = {}
+    direct, whole, dimmed = cache(partial(alike.direct, active=active)), cache(alike.image), None
+    if active & MANY_WAYS == {BETWEEN} and not is_below(picture, LARGE):
+        dimmed = of_one_surface(picture, renders, partial(direct, picture), u_of(picture.scene.uncertainty.reflectance))
+    if dimmed is None:
+        others = _steps(first, whole, of_other_surfaces(picture), picture)
+    changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
+    in_closed_form = light_in_closed_form(picture, how)
+    if in_closed_form is not None:
+        known |= {LIGHT: in_closed_form}
+        lines = {LIGHT: lines_by_lights(picture)}
+    else:
+        # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
+        made = whole if is_below(picture, LARGE) else direct
+        changed[LIGHT] = _steps(first, made, with_lights_moved(picture), picture)
+    changed = {name: some for name, some in changed.items() if some}
+    return Images(renders, changed, beside, known, lines, how.by_pixel)
+
+
+def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
+    """Images of all of a picture, as `measure.Images` has them, with what others of it have changed."""
+    how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
+    changed = *of_other_surfaces(picture), *(with_lights_moved(picture) if LIGHT in images.changed else ())
+    for seed in range(2):
+        alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
+        levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
+        sets.append([levels.image(picture, seed), *map(alike.image, (picture, *changed))])
+    return np.array(sets)
+
+
+def settled(picture: Picture, images: Images, how: How) -> Images:
+    """With what is changed as the mean of several sets of rays.
+
+    Rays that are the same in two pictures go the same ways only up to what is changed: where a light stands decides
+    what of bounced light a ray finds, and so much noise is left in their difference, which counts as uncertainty.
+    """
+    seeded = (replace(how, quality=replace(how.quality, seed=how.quality.seed + k)) for k in range(1, _SETS))
+    sets = [images.changed, *(completed(picture, images.renders, images.beside, each).changed for each in seeded)]
+    changed = {
+        name: tuple(np.mean(same, axis=0) for same in zip(*(each[name] for each in sets), strict=True))
+        for name in images.changed
+    }
+    return replace(images, changed=changed)
+
+
+def rebased(images: Images, renders: tuple[np.ndarray, ...]) -> Images:
+    """With other renders; what is changed differs from the first of them by as much as before."""
+    moved = {
+        name: tuple(renders[0] + (each - images.renders[0]) for each in some) for name, some in images.changed.items()
+    }
+    return replace(images, renders=renders, changed=moved)
+
+
+def _steps(
+    first: np.ndarray,
+    made: Callable[[Picture], np.ndarray],
+    others: Iterable[Picture],
+    picture: Picture,
+) -> tuple[np.ndarray, ...]:
+    """The first render with what other pictures differ by from this one, both of the same random numbers."""
+    changed, dark = [made(other) for other in others], picture.scene.noise.dark_level
+    here = made(picture) if changed else first
+    return tuple(_changed(first - dark, here - dark, other - dark) + dark for other in changed)
+
+
+def _changed(first: np.ndarray, here: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """An image as another one differs from this one, ``here``, both of few rays; grey levels above darkness.
+
+    Of the same picture with many rays, ``first``. Edges lie a little elsewhere in an image of few rays: what it says
+    of all levels together is taken of the other image itself, or a light that is farther away would move them.
+    """
+    part = float((other * here).sum()) / max(float((here * here).sum()), np.finfo(float).tiny)
+    return part * first + (other - part * here)
