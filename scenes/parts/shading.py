@@ -113,7 +113,7 @@ def _within(solid: Solid, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
     for k in range(many[faces].max()):
         some = np.flatnonzero((many[faces] > k) & (inside < 0))
         which = order[first[faces[some]] + k]
-        shares = _shares(solid.triangles[which], points[some])
+        shares = _shares(solid, which, points[some])
         better = shares.min(1) > inside[some]
         some, which, shares = some[better], which[better], shares[better]
         inside[some], triangle[some], share[some] = shares.min(1), which, shares
@@ -129,11 +129,18 @@ def _triangles_of(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.argsort(solid.triangle_faces, kind="stable"), np.cumsum(many) - many, many
 
 
-def _shares(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (n, 3) of points (n, 3) in triangles (n, 3, 3); NaN in those of no area."""
-    one, two, away = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], points - triangles[:, 0]
+@lru_cache(maxsize=8)
+def _slopes(solid: Solid) -> np.ndarray:
+    """Slopes (T, 2, 3) of the shares of each triangle's second and third corner; NaN in those of no area."""
+    one, two = (solid.triangles[:, k] - solid.triangles[:, 0] for k in (1, 2))
     across = np.cross(one, two)
     with np.errstate(divide="ignore", invalid="ignore"):
         across /= (across**2).sum(1, keepdims=True)
-        second, third = ((np.cross(*pair) * across).sum(1) for pair in ((away, two), (one, away)))
+        return np.stack([np.cross(two, across), np.cross(across, one)], 1)
+
+
+def _shares(solid: Solid, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (n, 3) of points (n, 3) in triangles (n,); NaN in those of no area."""
+    away = points - solid.triangles[triangles, 0]
+    second, third = np.moveaxis(np.einsum("nki,ni->nk", _slopes(solid)[triangles], away), 1, 0)
     return np.stack([1 - second - third, second, third], 1)
