@@ -23,8 +23,8 @@ ESTIMATORS = ("gradient", "isophote", "canny", "strip", "arrangement")
 
 @pytest.fixture(scope="module")
 def crowded(small_task1):
-    """(picture, exact image, other renders) at random poses at which every estimator measures, and the classic locator is
-    off by 0.5 sigma or more."""
+    """(picture, exact image, other renders) at random poses at which every estimator measures, and the classic locator
+    is off by 0.5 sigma or more."""
     rng, found = np.random.default_rng(7), []
     while len(found) < 3:
         sensor, light = (Pose(*rng.uniform((low, 0), (60, 360))) for low in (5, 2))
