@@ -20,7 +20,7 @@ from imaging.boards.fitting import crossing_rows
 from imaging.boards.saddle import response
 from imaging.boards.windows import Marked, windows
 from imaging.boards.windows import steps as ways
-from imaging.features.placing import steps
+from imaging.features.displaced import points_by_deviations
 from imaging.features.seen import Seen
 from imaging.geometry.blur import blur_at
 from imaging.geometry.lens import image_centre, lens_jacobian, recorded
@@ -30,14 +30,13 @@ from imaging.light.appearance import signal
 from imaging.pictures import Pictures
 from scenes import Board, Material, Scene
 from scenes.board import PITCH
-from scenes.placement import of_board, prior
+from scenes.placement import of_board, root
 
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
 CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
 NEEDED = f"no point of the board is found: it must be lit, in the picture, and {CLEAR:g} px beside the part there"
 _UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
 _EXACT = 1e-16  # px^2: of points without noise and print
-_UNITS = np.repeat([1.0, np.pi / 180], 3)  # of a placement's components: the scene's unit, and degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +106,12 @@ def seen_board(pictures: Pictures, seen: Seen) -> SeenBoard | None:
     if board is None:
         return None
     by_place = seen.slopes(board.points)  # (..., n, 2, 3)
-    moved = by_place @ (steps(board.points, np.array(seen.camera.look_at)) * _UNITS)
-    u = prior(said)
+    moved = points_by_deviations(board.points, pictures.sensors, pictures.scene)
     away = board.points - np.array(board.corner)
     by_pitch = np.einsum("...nij,nj->...ni", by_place, away / board.pitch)[..., None] * _pitch_u(pictures.scene)
-    beside = np.concatenate([moved * of_board(said), by_pitch], -1)
+    beside = np.concatenate([moved[..., :6] * of_board(said), by_pitch], -1)
     return SeenBoard(
-        slopes=moved[..., u > 0] * u[u > 0],
+        slopes=moved @ root(pictures.scene),
         noise=_noise(pictures, board),
         printed=board.point_sd**2 * by_place @ np.swapaxes(by_place, -1, -2),
         beside=beside,

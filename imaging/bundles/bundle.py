@@ -16,12 +16,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from imaging.bundles.cameras import by_camera
 from imaging.bundles.in_space import InSpace
 from imaging.bundles.told import Told
 from imaging.bundles.unknowns import Freedom, Unknowns, rim, rim_moves
+from imaging.features.displaced import around, by_camera, by_place, of_circle, rim_fit, rim_normals, steps
 from imaging.features.measurand import measurands
-from imaging.features.placing import around, by_place, of_circle, rim_fit, rim_normals, steps, whitening
+from imaging.features.placing import whitening
 from imaging.features.seen import Seen
 from imaging.geometry.projection import from_axis
 from imaging.pictures import Pictures
