@@ -53,9 +53,9 @@ class Placement(Model):
     """What stands beside the part; ``uncertainty.board_shift`` and ``board_tilt_deg`` say how exactly."""
     camera: tuple[Estimated, ...] = ()
     """What of the camera is estimated in the same picture, with datums or a board: focal, its focal length or
-    magnification; k1, the first coefficient of its lens' distortion. How well that is known before is what the scene
-    says of the camera's numbers, or of their covariance; of what it says nothing, to a tenth (1 sigma) of the focal
-    length, and to 0.1 of k1."""
+    magnification; with a board also k1, the first coefficient of its lens' distortion. How well that is known before
+    is what the scene says of the camera's numbers, or of their covariance; where it says nothing, to a tenth
+    (1 sigma) of the focal length, and to 0.1 of k1."""
     expected: tuple[Coordinate, ...] = (0.0,) * 6
     """Shift along x, y, z [length] and rotation vector [degrees] that are expected, beside where the scene says; then
     of each of ``camera`` the deviation, of the focal length its logarithm."""
@@ -187,6 +187,8 @@ def _check_camera(scene: Scene) -> None:
         )
     if len(set(placement.camera)) < len(placement.camera):
         raise ValueError(f"placement.camera must have each once, got {list(placement.camera)}")
+    if "k1" in placement.camera and placement.source != "board":
+        raise ValueError("placement.camera must be without k1 unless placement.from is board, got it")
     if "k1" in placement.camera and scene.camera.lens.kind != "brown_conrady":
         raise ValueError(f"placement.camera must be without k1 of a {scene.camera.lens.kind} lens, got it")
     if len(placement.expected) not in (6, len(placement.mean)):

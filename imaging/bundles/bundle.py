@@ -306,3 +306,8 @@ def _check(pictures: tuple[Picture, ...]) -> None:
             )
     if first.placement.board is not None:
         raise InvalidInput("placement.from must be known, uncertain or datums for several pictures, got 'board'")
+    if first.placement.camera:
+        raise InvalidInput(
+            "placement.camera must be left out of several pictures, where the covariance says what is unknown, got "
+            f"{list(first.placement.camera)}"
+        )

@@ -20,7 +20,7 @@ from imaging.features.displaced import by_deviations
 from imaging.features.seen import Seen
 from scenes import Quantity, Scene, Side
 from scenes.measurands.features import ends_of
-from scenes.placement import components, datums_of, root
+from scenes.placement import COMPONENTS, components, datums_of, root
 from scenes.status import OF_SIGMA, OF_TOLERANCE
 
 if TYPE_CHECKING:
@@ -210,10 +210,13 @@ class Adjustment:
 
     def guilty(self, gradient: np.ndarray) -> str:
         """The component that has most of the direction which matters most to one value of one picture, by its
-        gradient (q,)."""
+        gradient (q,), and what of the camera cannot be told from it."""
         left = self._untold(gradient[None])[0]
         direction = self._directions[1][:, int(np.abs(left).argmax())]
-        return self.placing.names[int(np.abs(direction).argmax())]
+        first, moves = int(np.abs(direction).argmax()), np.abs(self.pulls(gradient[None])[0] * direction)
+        camera = [i for i, name in enumerate(self.placing.names) if name not in COMPONENTS and i != first]
+        beside = [self.placing.names[i] for i in camera if moves[i] > moves[first] / 2]
+        return " or ".join([self.placing.names[first], *beside])
 
     def _untold(self, gradient: np.ndarray) -> np.ndarray:
         """What each direction adds, (..., M, k)."""
