@@ -60,6 +60,12 @@ def estimated(scene: Scene, *which: str) -> Scene:
     return scene.with_(placement={"camera": which}, uncertain=rows)
 
 
+def lenient(scene: Scene) -> Scene:
+    """A scene of wide tolerances: what a picture leaves open of the camera is told, and not refused."""
+    rows = [each.model_dump(exclude_none=True) | {"tolerance": 0.5} for each in scene.measurands]
+    return scene.with_(measurands=rows)
+
+
 def as_said(picture: Picture) -> Picture:
     """The same picture by who takes the camera's numbers for what the scene says."""
     return picture.with_scene(picture.scene.with_(placement={"camera": []}))

@@ -210,13 +210,14 @@ class Adjustment:
 
     def guilty(self, gradient: np.ndarray) -> str:
         """The component that has most of the direction which matters most to one value of one picture, by its
-        gradient (q,), and what of the camera cannot be told from it."""
+        gradient (q,); with the camera's, all that cannot be told from each other."""
         left = self._untold(gradient[None])[0]
         direction = self._directions[1][:, int(np.abs(left).argmax())]
-        first, moves = int(np.abs(direction).argmax()), np.abs(self.pulls(gradient[None])[0] * direction)
-        camera = [i for i, name in enumerate(self.placing.names) if name not in COMPONENTS and i != first]
-        beside = [self.placing.names[i] for i in camera if moves[i] > moves[first] / 2]
-        return " or ".join([self.placing.names[first], *beside])
+        first, names = int(np.abs(direction).argmax()), self.placing.names
+        if set(names) <= set(COMPONENTS):
+            return names[first]
+        moves = np.abs(self.pulls(gradient[None])[0] * direction)
+        return " or ".join(name for i, name in enumerate(names) if i == first or moves[i] > moves.max() / 2)
 
     def _untold(self, gradient: np.ndarray) -> np.ndarray:
         """What each direction adds, (..., M, k)."""

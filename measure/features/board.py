@@ -31,7 +31,8 @@ from scenes.placement import limits, root
 
 _FEWEST = 6  # points that a board is told by
 _STEPS, _FAR = 10, 2.0  # of Gauss and Newton; px that a board's points are left off by at most
-_HELD = 1e-3  # px: of a placement of one standard uncertainty, where points do not tell it
+_HELD = 0.02  # px: of a placement of one standard uncertainty, about what a point is known to
+_OTHER = 0.5  # of the focal length's logarithm, or k1: another camera, which points in a wrong order ask for
 _BEYOND = 1.25  # of what is plausible: where noise may take a place that is hardly told
 _WIDE = 4  # px that a lens may bend a board's sides by, or more
 _AROUND = 96  # places on a dot's outline
@@ -103,11 +104,11 @@ def _nearest(picture: Picture, grid: np.ndarray) -> tuple[float, np.ndarray]:
         wanted = undistorted(grid.reshape(-1, 2), there.scene.camera)
         off = wanted - project_ideal(points, sensor, there.scene.camera)
         good = np.isfinite(off).all(1)
-        if good.sum() < _FEWEST:
+        if good.sum() < _FEWEST or np.abs(here[6:]).max(initial=0.0) > _OTHER:
             return np.inf, here
         left = float(np.sqrt((off[good] ** 2).sum(1).mean()))
         rows = (points_by_deviations(points, sensor, there.scene) @ free)[good].reshape(-1, len(held))
-        wanted = np.append(off[good], np.zeros(len(held)))
+        wanted = np.append(off[good], held @ np.linalg.pinv(free) @ there.scene.placement.mean)
         here = combined(here, free @ np.linalg.lstsq(np.concatenate([rows, held]), wanted, rcond=None)[0])
     return left, here
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from scenes.cameras.lens import Lens
 from scenes.numbers import number_at, with_number
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def adjusted(camera: Camera, which: tuple[Estimated, ...], deviations: np.ndarra
     for name, off in zip(which, deviations.tolist(), strict=True):
         if name == "focal":
             camera = camera.enlarged(float(np.exp(off)))
-        else:
+        elif isinstance(camera.lens, Lens):
             k1, *others = camera.lens.coefficients
             camera = camera.tried(lens=camera.lens.tried(distortion=(k1 + off, *others)))
     return camera

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scenes.cameras.estimated import K1
+from scenes.numbers import number_at
 from scenes.status import is_trusted
 from validation.strict_json import plain
 
@@ -46,7 +48,7 @@ def _of_camera(found: measure.Located) -> list[tuple[str, float, float]]:
     scene, rows = found.picture.scene, []
     for name, sd in zip(scene.placement.camera, np.sqrt(np.diag(found.covariance))[6:], strict=True):
         told = is_trusted(found.status)
-        value = scene.camera.focal_px if name == "focal" else scene.camera.lens.coefficients[0]
-        scale = scene.camera.focal_px if name == "focal" else 1.0
-        rows.append(({"focal": "focal_px"}.get(name, name), value if told else np.nan, scale * sd))
+        focal = scene.camera.focal_px
+        label, value, scale = ("focal_px", focal, focal) if name == "focal" else (name, number_at(scene, K1), 1.0)
+        rows.append((label, value if told else np.nan, scale * sd))
     return rows
