@@ -134,7 +134,8 @@ def _noise(pictures: Pictures, board: Board) -> np.ndarray:
         size = noise / share**2
     unit = back @ _unit(pictures, board, places)[..., None, :, :] @ np.swapaxes(back, -1, -2)
     found = size[..., None, None] * unit
-    good = np.isfinite(found).all((-1, -2)) & (share > 0) & (_inside(places, camera) & _apart(pictures, board))
+    there = _inside(places, camera) & _apart(pictures, board)[..., None]
+    good = np.isfinite(found).all((-1, -2)) & (share > 0) & there
     return np.where(good[..., None, None], found, np.where(np.eye(2, dtype=bool), np.inf, 0.0))
 
 
@@ -179,17 +180,21 @@ def _inside(places: np.ndarray, camera) -> np.ndarray:
 
 
 def _apart(pictures: Pictures, board: Board) -> np.ndarray:
-    """Whether a side of the board has all of the part behind it in the picture, bool (..., 1)."""
-    camera = pictures.scene.camera
-    outline = from_axis(board.outline, pictures.sensors, camera)
-    part = from_axis(pictures.scene.solid.vertices, pictures.sensors, camera)
+    """Whether a side of the board has all of the part behind it in the picture, bool (...)."""
+    shown = (board.outline, pictures.scene.solid.vertices)
+    return apart(*(from_axis(each, pictures.sensors, pictures.scene.camera) for each in shown))
+
+
+def apart(outline: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Whether a side of a board's image (..., 4, 2) has all points of a part's image (..., n, 2) `CLEAR` px beyond it,
+    bool (...)."""
     side = np.roll(outline, -1, -2) - outline
     normal = np.stack([side[..., 1], -side[..., 0]], -1)
     normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
     away = np.einsum("...si,...spi->...sp", normal, part[..., None, :, :] - outline[..., :, None, :])
     middle = np.einsum("...si,...si->...s", normal, outline.mean(-2, keepdims=True) - outline)
     beyond = -np.sign(middle)[..., None] * away
-    return (beyond > CLEAR).all(-1).any(-1)[..., None]
+    return (beyond > CLEAR).all(-1).any(-1)
 
 
 def _unit(pictures: Pictures, board: Board, places: np.ndarray) -> np.ndarray:
