@@ -25,7 +25,7 @@ from imaging.models.errors import Errors
 from imaging.pictures import Pictures
 from planner.budgeting.budgets import SceneBudget, budget
 from planner.search.objective import DEFAULT_OVER, Aim, minimised
-from scenes import Board, InvalidInput, Picture, Scene
+from scenes import Board, InvalidInput, Picture, Pose, Scene
 from scenes.board import PITCH
 from scenes.placement import limits
 from scenes.uncertain import UncertainNumber
@@ -79,6 +79,12 @@ class BoardPlan:
     moved: PlacedBoard | None
     best: PlacedBoard
     evaluated: int
+
+    @property
+    def light(self) -> Pose | tuple[Pose, ...]:
+        """Pose of the free light, or of each."""
+        free = self.picture.free_lights
+        return free[0] if len(free) == 1 else free
 
 
 def place_board(
