@@ -210,7 +210,7 @@ def _squares(picture, start, there, image):
     return off @ np.linalg.solve(where.covariance, off) if where.status == "ok" else np.inf
 
 
-@pytest.mark.parametrize("count", [2, 14])
+@pytest.mark.parametrize("count", [1, 14])
 def test_places_and_focal_lengths_are_as_well_known_as_told(roof, count):
     """`python -m tests.proofs placements --camera focal`, reduced: chi-square of noisy pictures by drawn cameras."""
     rng, total, wrong = np.random.default_rng(5), 0.0, 0.0
