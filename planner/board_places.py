@@ -81,6 +81,12 @@ class BoardPlan:
     evaluated: int
 
     @property
+    def named(self) -> dict[str, PlacedBoard]:
+        """Those that there are, the scene's first and the best last."""
+        each = {"as the scene says": self.before, "as large, elsewhere": self.moved, "best": self.best}
+        return {name: placed for name, placed in each.items() if placed is not None}
+
+    @property
     def light(self) -> Pose | tuple[Pose, ...]:
         """Pose of the free light, or of each."""
         free = self.picture.free_lights

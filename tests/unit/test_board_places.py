@@ -18,6 +18,8 @@ from scenes import InvalidInput
 from scenes.placement import limits
 from tests import printed
 from tests.commands import ice
+from tests.docs.pages import DOCS, keys
+from tests.docs.pages import told as told_of
 from validation.planned_scene import write_board
 
 POSES = (20, 270), (20, 90)
@@ -119,7 +121,9 @@ def test_the_command_says_where_it_should_stand(few):
         told, facts = ice(*asked).stdout, json.loads(ice(*asked, "--json").stdout)
     assert "as the scene says" in told
     assert "6 x 4" in told or "6 x 6" in told or "4 x 4" in told
-    assert facts["best"]["board"]["shape"] == list(few.best.board.shape)
-    assert [row["U"] for row in facts["best"]["measurands"]] == [each.U for each in few.best.budget]
-    assert facts["moved"] is None
+    before, best = facts["boards"]  # none of the scene's size was tried
+    assert best["board"]["shape"] == list(few.best.board.shape)
+    assert [row["U"] for row in best["measurands"]] == [each.U for each in few.best.budget]
+    assert before["name"] == "as the scene says"
     assert facts["light"] == [20, 90]
+    assert set(keys(facts)) == told_of(DOCS / "json.md", "ice plan --place-board")[0]

@@ -58,16 +58,16 @@ def facts(found: planner.BoardPlan, seconds: float) -> dict[str, Any]:
     """Everything for JSON."""
     return {
         "scene": found.picture.scene.name, "sensor": list(found.picture.sensor),
-        "light": scenes.pairs(found.light), "before": _placed(found.before),
-        "moved": None if found.moved is None else _placed(found.moved), "best": _placed(found.best),
+        "light": scenes.pairs(found.light), "boards": [_placed(*each) for each in found.named.items()],
         "evaluated": found.evaluated, "seconds": seconds,
     }  # fmt: skip
 
 
-def _placed(each: PlacedBoard) -> dict[str, Any]:
+def _placed(name: str, each: PlacedBoard) -> dict[str, Any]:
     budget = each.budget
     rows = () if budget is None else zip(budget.measurands, budget.statuses, strict=True)
     return {
+        "name": name,
         "board": {**picked(each.board, "kind", "corner", "shape", "pitch"), "size": each.board.size},
         "objective": each.objective,
         "measurands": [{**picked(one, "name", "unit", "U"), "status": status} for one, status in rows],

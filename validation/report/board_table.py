@@ -21,8 +21,7 @@ _TERMS = (
 def report(found: planner.BoardPlan, seconds: float) -> Group:
     """The boards, the measurands, and what to do next."""
     scene = found.picture.scene
-    tried = {"as the scene says": found.before, "as large, elsewhere": found.moved, "best": found.best}
-    known = {name: each for name, each in tried.items() if each is not None}
+    known = found.named
     states = [] if found.best.budget is None else list(found.best.budget.statuses)
     notes = [_TERMS, *(f" {line}" for line in legend(states, [""] * len(states)))]
     if found.moved is None:
