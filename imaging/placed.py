@@ -10,6 +10,7 @@ import numpy as np
 
 from imaging.geometry.projection import camera_frame, direction, frame
 from scenes import Picture, Pose
+from scenes.cameras import estimated
 from scenes.placement import prior
 
 
@@ -42,8 +43,9 @@ def placed(picture: Picture, placement: np.ndarray) -> Picture:
     Parameters
     ----------
     picture : Picture
-    placement : ndarray, shape (6,)
-        Shift along x, y and z, the scene's unit, and rotation vector about the point that the camera looks at, degrees.
+    placement : ndarray, shape (6,) or (6 + c,)
+        Shift along x, y and z, the scene's unit, and rotation vector about the point that the camera looks at, degrees;
+        then the deviations of what is estimated of the camera (`scenes.cameras.estimated`), else 0.
 
     Returns
     -------
@@ -57,8 +59,10 @@ def placed(picture: Picture, placement: np.ndarray) -> Picture:
     >>> placed(task1, np.array([0, 0, 0, 0, 0, 10.0])).sensor.printed
     '(30.0, 125.0)'
     """
-    scene, shift = picture.scene, np.asarray(placement, float)[:3]
-    back = turn(placement[3:]).T
+    scene, numbers = picture.scene, picture.scene.placement.camera
+    placement = np.asarray(placement, float)
+    placement = np.pad(placement, (0, 6 + len(numbers) - placement.size))
+    shift, back = placement[:3], turn(placement[3:6]).T
     lights = tuple(_turned(pose, back) for pose in picture.lights)
     moved = [
         light if light.pose is None else light.tried(pose=_turned(light.pose, back)) for light in scene.lights
@@ -68,37 +72,38 @@ def placed(picture: Picture, placement: np.ndarray) -> Picture:
     right, level = back @ camera_frame(camera, sensor).right, frame(np.array(list(pose)))
     roll = float(np.degrees(np.arctan2(right @ level.down, right @ level.right)))
     at = np.array(camera.look_at) - back @ shift
-    changes = {"camera": camera.tried(look_at=tuple(at.tolist()), roll_deg=roll)}
-    changes["placement"] = scene.placement.tried(expected=_left(picture, np.asarray(placement, float), back))
+    moved_camera = camera.tried(look_at=tuple(at.tolist()), roll_deg=roll)
+    changes = {"camera": estimated.adjusted(moved_camera, numbers, placement[6:])}
+    changes["placement"] = scene.placement.tried(expected=_left(picture, placement, back))
     whole = scene.tried(**changes)
     return Picture(whole.lit_by(*moved) if any(light.pose for light in moved) else whole, pose, lights)
 
 
 def combined(first: np.ndarray, then: np.ndarray) -> np.ndarray:
-    """The placement (6,) of a part that is placed by ``then`` in the picture that ``first`` made.
+    """The placement (6 + c,) of a part that is placed by ``then`` in the picture that ``first`` made.
 
     >>> combined(np.array([1.0, 0, 0, 0, 0, 90.0]), np.array([1.0, 0, 0, 0, 0, 0])).round(9).tolist()
     [1.0, 1.0, 0.0, 0.0, 0.0, 90.0]
     """
-    turned, more = turn(first[3:]), turn(then[3:])
+    turned, more = turn(first[3:6]), turn(then[3:6])
     shift = turned @ more @ turned.T @ first[:3] + turned @ then[:3]
-    return np.concatenate([shift, turn_vector(turned @ more)])
+    return np.concatenate([shift, turn_vector(turned @ more), first[6:] + then[6:]])
 
 
 def difference(there: np.ndarray, here: np.ndarray) -> np.ndarray:
-    """The placement (6,) that takes the picture that ``here`` made to that of ``there``: of `combined` the inverse."""
-    turned, wanted = turn(here[3:]), turn(there[3:])
+    """The placement (6 + c,) that takes the picture of ``here`` to that of ``there``: of `combined` the inverse."""
+    turned, wanted = turn(here[3:6]), turn(there[3:6])
     more = turned.T @ wanted
     shift = turned.T @ (there[:3] - turned @ more @ turned.T @ here[:3])
-    return np.concatenate([shift, turn_vector(more)])
+    return np.concatenate([shift, turn_vector(more), there[6:] - here[6:]])
 
 
 def _left(picture: Picture, placement: np.ndarray, back: np.ndarray) -> tuple[float, ...]:
     """What is expected of the place beside a placement, along the part's own axes, to first order in both."""
     free = prior(picture.scene.uncertainty) > 0
-    left = np.array(picture.scene.placement.expected) - placement
-    left = np.concatenate([back @ left[:3], back @ left[3:]])
-    return tuple(np.where(free, left, 0.0).tolist())
+    left = picture.scene.placement.mean - placement
+    first = np.where(free, np.concatenate([back @ left[:3], back @ left[3:6]]), 0.0)
+    return (*first.tolist(), *left[6:].tolist())
 
 
 def _turned(pose: Pose, back: np.ndarray) -> Pose:

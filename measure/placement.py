@@ -18,7 +18,6 @@ from measure.quantities import MeasuredFeatures, find
 from measure.registration import Place, candidates, rivals
 from scenes import InvalidInput, Picture, Scene, status
 from scenes.arrays import picture as one_picture
-from scenes.placement import prior
 
 _STEPS = 6
 _SETTLED = 0.02  # px that an adjustment still moves a datum: what is not linear in it is then far below the noise
@@ -33,12 +32,12 @@ class Located:
     picture : Picture
         The part where it lies to a few hundredths of a px, as `measure.measure` takes it, which adjusts the rest; as
         the scene says where `status` is not ``ok``.
-    placement : ndarray, shape (6,)
+    placement : ndarray, shape (6 + c,)
         Shift along x, y and z, the scene's unit, and rotation vector about the point that the camera looks at,
-        degrees.
-    covariance : ndarray, shape (6, 6)
-        Of the shift and of the rotation that is still missing, along the part's own axes; the scene's unit and degrees
-        squared. Infinite on the diagonal where it is not found.
+        degrees; then the deviation of each of ``placement.camera``, of the focal length its logarithm.
+    covariance : ndarray, shape (6 + c, 6 + c)
+        Of the shift and of the rotation that is still missing, along the part's own axes, and of the camera's
+        deviations; the scene's unit and degrees squared. Infinite on the diagonal where it is not found.
     status : str
         ``ok``; ``ambiguous`` where another place explains the picture as well; ``not_visible`` where none does.
     explained : float
@@ -100,7 +99,7 @@ def locate(
 def adjusted(
     image: np.ndarray, picture: Picture, start: np.ndarray, estimator: str | None = None, explained: float = 1.0
 ) -> Located:
-    """The place of a part that lies about at a start (6,), within the capture of the locator.
+    """The place of a part that lies about at a start (6 + c,), within the capture of the locator.
 
     First by the gradient locator, which needs no lights; then, in plain scenes, by the estimator that is meant, which
     may take levels from the lights.
@@ -114,7 +113,7 @@ def adjusted(
         for _ in range(_STEPS):
             there = placed(picture, here)
             found = find(image[None], there if lit else there.unlit(), method)
-            step = _step(found, picture)
+            step = found.known.placing.root @ found.placement[0]
             if not np.isfinite(step).all() or not _told(found).any():
                 return _nowhere(picture, status.NOT_VISIBLE, _why_untold(found), explained)
             before, here = here, combined(here, step)
@@ -122,7 +121,7 @@ def adjusted(
                 break
         else:
             return _nowhere(picture, status.ILL_CONDITIONED, "its adjustment does not settle", explained)
-    return Located(placed(picture, before), here, _covariance(found, picture), status.OK, explained)
+    return Located(placed(picture, before), here, found.adjustment.covariance()[0], status.OK, explained)
 
 
 def _told(found: MeasuredFeatures) -> np.ndarray:
@@ -139,13 +138,6 @@ def _why_untold(found: MeasuredFeatures) -> str:
     return "nothing that tells it is found"
 
 
-def _step(found: MeasuredFeatures, picture: Picture) -> np.ndarray:
-    """What the adjustment of one image says is still missing, (6,)."""
-    u, step = prior(picture.scene.uncertainty), np.zeros(6)
-    step[u > 0] = found.placement[0] * u[u > 0]
-    return step
-
-
 def _moved(found: MeasuredFeatures) -> float:
     """How far that moves the datums' ends or radii, or the board's points, at most, px."""
     placing, seen = found.known.placing, found.known.seen
@@ -160,15 +152,9 @@ def _moved(found: MeasuredFeatures) -> float:
     return float(np.abs(moved * size)[_told(found)].max(initial=0.0))
 
 
-def _covariance(found: MeasuredFeatures, picture: Picture) -> np.ndarray:
-    free = np.flatnonzero(prior(picture.scene.uncertainty) > 0)
-    whole = np.zeros((6, 6))
-    whole[np.ix_(free, free)] = found.adjustment.covariance()[0]
-    return whole
-
-
 def _nowhere(picture: Picture, state: str, reason: str, explained: float) -> Located:
-    return Located(picture, np.full(6, np.nan), np.diag(np.full(6, np.inf)), state, explained, reason)
+    none = np.full(picture.scene.placement.mean.size, np.nan)
+    return Located(picture, none, np.diag(np.full(none.size, np.inf)), state, explained, reason)
 
 
 def _both(best: Place, other: Place) -> str:

@@ -14,14 +14,15 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from imaging.features.placing import steps
+from imaging.features.displaced import points_by_deviations
 from imaging.features.rim_sides import seen_along
-from imaging.geometry.projection import camera_frame, facing, jacobian, project
+from imaging.geometry.lens import lens_jacobian
+from imaging.geometry.projection import camera_frame, facing, jacobian, project, project_ideal
 from imaging.geometry.visibility import boundaries, visible_spans
 from imaging.pictures import Pictures
 from imaging.placed import combined, difference, placed, turn, turn_vector
 from scenes import Picture
-from scenes.placement import MOST_TILT, limits, prior
+from scenes.placement import MOST_TILT, limits, root
 
 _COARSE = 320  # px of the shorter side of the picture in which shifts are tried
 _BINS = 8  # directions of edges, over half a turn
@@ -50,8 +51,8 @@ class Place:
 
     Attributes
     ----------
-    placement : ndarray, shape (6,)
-        Shift, the scene's unit, and rotation vector, degrees (`scenes.placement.COMPONENTS`).
+    placement : ndarray, shape (6 + c,)
+        Shift, the scene's unit, rotation vector, degrees, and the camera's deviations (`scenes.placement.root`).
     explained : float
         Share of the model's visible edges upon which a step of grey levels lies.
     """
@@ -60,7 +61,7 @@ class Place:
     explained: float
 
     def __str__(self) -> str:
-        shift, turn = (", ".join(f"{value:.3g}" for value in part) for part in np.split(self.placement, 2))
+        shift, turn = (", ".join(f"{value:.3g}" for value in part) for part in np.split(self.placement[:6], 2))
         return f"shift ({shift}), turn ({turn}) degrees"
 
 
@@ -154,11 +155,11 @@ def _different(picture: Picture, found: list[Place]) -> list[Place]:
 
 def _is_plausible(picture: Picture, placement: np.ndarray) -> bool:
     """Whether its shift, and its tilt and turn one after the other, are within what the scene says, and a little."""
-    expected, axis = np.array(picture.scene.placement.expected), _free_axis(picture)
-    left = placement - expected
+    expected, axis = picture.scene.placement.mean[:6], _free_axis(picture)
+    left = placement[:6] - expected
     if axis is not None:  # a rotation vector's components are no tilts where it is long
-        about = 2 * np.degrees(np.arctan(_half_tangent(turn(placement[3:]), axis)))
-        tilt = turn_vector(turn(placement[3:]) @ turn(about * axis).T)
+        about = 2 * np.degrees(np.arctan(_half_tangent(turn(placement[3:6]), axis)))
+        tilt = turn_vector(turn(placement[3:6]) @ turn(about * axis).T)
         left = np.concatenate([left[:3], tilt + about * axis - expected[3:]])
     return bool((np.abs(left) <= _BEYOND * limits(picture.scene.uncertainty) + 1e-9).all())
 
@@ -177,10 +178,15 @@ def rivals(found: tuple[Place, ...]) -> tuple[Place, ...]:
 
 def _shifts(picture: Picture, placement: np.ndarray) -> float:
     """How far a placement moves the part's picture at most, px."""
-    sensor, camera, points = np.array(list(picture.sensor)), picture.scene.camera, picture.scene.solid.vertices
-    slopes = jacobian(points, sensor, camera) @ steps(points, np.array(camera.look_at))
-    moved = slopes @ np.concatenate([placement[:3], np.radians(placement[3:])])
+    moved = _recorded_by(picture, picture.scene.solid.vertices) @ placement
     return float(np.linalg.norm(moved, axis=-1).max())
+
+
+def _recorded_by(picture: Picture, points: np.ndarray) -> np.ndarray:
+    """Derivatives (n, 2, 6 + c) of where points are recorded by placement and the camera's deviations, px."""
+    sensor, scene = np.array(list(picture.sensor)), picture.scene
+    lens = lens_jacobian(project_ideal(points, sensor, scene.camera), scene.camera)
+    return lens @ points_by_deviations(points, sensor, scene)
 
 
 def _free_axis(picture: Picture) -> np.ndarray | None:
@@ -197,7 +203,8 @@ def _turned_alike(picture: Picture, placement: np.ndarray) -> list[np.ndarray]:
     corners, pivot = here.scene.solid.vertices, np.array(here.scene.camera.look_at)
     away = (corners.min(0) + corners.max(0)) / 2 - pivot
     angles = sorted({360 * k / count for count in _SYMMETRIES for k in range(1, count)})
-    return [combined(placement, np.concatenate([away - turn(a * axis) @ away, a * axis])) for a in angles]
+    more = np.zeros(len(placement) - 6)
+    return [combined(placement, np.concatenate([away - turn(a * axis) @ away, a * axis, more])) for a in angles]
 
 
 def _starts(image: np.ndarray, picture: Picture) -> list[tuple[np.ndarray, Outline]]:
@@ -213,7 +220,7 @@ def _starts(image: np.ndarray, picture: Picture) -> list[tuple[np.ndarray, Outli
     across = [float(np.abs(axis) @ reach[:3]) for axis in (axes.right, axes.down)]
     scale = camera.focal_px / camera.distance / shrink
     most = np.ceil(np.array(across) * scale / _STEP).astype(int)
-    rows, model, of = [], None, np.inf
+    rows, model, of, camera_as_said = [], None, np.inf, np.zeros(len(picture.scene.placement.camera))
     for angle in _angles(float(np.abs(axis) @ reach[3:])):
         turned = placed(picture, np.concatenate([np.zeros(3), angle * axis]))
         if model is None or abs(angle - of) > _ALIKE:
@@ -222,7 +229,7 @@ def _starts(image: np.ndarray, picture: Picture) -> list[tuple[np.ndarray, Outli
         score = _score(near, (at + 0.5) / shrink - 0.5, normal, most)
         for y, x in _peaks(score):
             along = _STEP / scale * ((x - most[0]) * axes.right + (y - most[1]) * axes.down)
-            rows.append((score[y, x], np.concatenate([along, angle * axis]), model))
+            rows.append((score[y, x], np.concatenate([along, angle * axis, camera_as_said]), model))
     kept: list[tuple[np.ndarray, Outline]] = []
     for _, placement, model in sorted(rows, key=lambda row: -row[0]):
         apart = (_shifts(picture, difference(placement, other)) for other, _ in kept)
@@ -327,27 +334,18 @@ def _bilinear(image: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 def _refined(slopes: _Slopes, picture: Picture, start: np.ndarray, reaches: tuple[float, ...], model: Outline) -> Place:
     """The place near a start at which steps lie upon the model's edges, with what is known of it before."""
-    here, u = start, prior(picture.scene.uncertainty)
-    free = np.flatnonzero(u > 0)
+    here, free = start, root(picture.scene)
+    back = np.linalg.pinv(free)
     for reach in reaches:
         there = placed(picture, here)
         at, normal = model.seen(there)
         off, good = slopes.steps(at, normal, reach)
-        rows = _rows(there, model.points, normal)[:, free] * u[free]
-        known = np.array(there.scene.placement.expected)[free] / u[free]
-        step = np.zeros(6)
-        step[free] = _robust(rows, np.where(good, off, np.nan), known, reach) * u[free]
-        here = combined(here, step)
+        rows = np.einsum("ni,nik->nk", normal, _recorded_by(there, model.points)) @ free
+        known = back @ there.scene.placement.mean
+        here = combined(here, free @ _robust(rows, np.where(good, off, np.nan), known, reach))
     at, normal = model.seen(placed(picture, here))
     off, good = slopes.steps(at, normal, reaches[-1])
     return Place(here, float((good & (np.abs(off) < _EXPLAINED)).mean()))
-
-
-def _rows(picture: Picture, points: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Derivatives (n, 6) of points' places along their normals by the placement, px for the unit and degrees."""
-    sensor, camera = np.array(list(picture.sensor)), picture.scene.camera
-    slopes = jacobian(points, sensor, camera) @ steps(points, np.array(camera.look_at))
-    return np.einsum("ni,nik->nk", normal, slopes) * np.repeat([1.0, np.pi / 180], 3)
 
 
 def _robust(rows: np.ndarray, off: np.ndarray, known: np.ndarray, reach: float) -> np.ndarray:

@@ -30,12 +30,14 @@ from planner.view_sets import View, Views, ViewSet
 from planner.views import plan_views
 
 if TYPE_CHECKING:
+    from planner.board_places import BoardPlan, place_board
     from planner.budgeting.budgets import SceneBudget, budget
     from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
     from planner.certifying.certificate import Certificate, certified
 
 _LATER = {
+    "BoardPlan": "board_places", "place_board": "board_places",
     "BundleBudget": "budgeting.bundles", "SceneBudget": "budgeting.budgets", "budget": "budgeting.budgets",
     "bundle_budget": "budgeting.bundles", "CapabilityPlan": "budgeting.plans", "plan_capability": "budgeting.plans",
     "Certificate": "certifying.certificate", "certified": "certifying.certificate",
@@ -55,6 +57,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "Aim",
+    "BoardPlan",
     "BundleBudget",
     "BundlePrediction",
     "Candidate",
@@ -87,6 +90,7 @@ __all__ = [
     "coverage",
     "exhaustive",
     "image",
+    "place_board",
     "plan",
     "plan_capability",
     "plan_views",

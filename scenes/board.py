@@ -135,6 +135,12 @@ class Board(Model):
         return self.at(self.outer)
 
     @property
+    def size(self) -> tuple[float, float]:
+        """Lengths of its own sides, along rows and along columns, the scene's unit."""
+        across, down = self.pitch * (self.outer[2] - self.outer[0])
+        return float(across), float(down)
+
+    @property
     def dark_polygons(self) -> np.ndarray:
         """Corners (m, k, 2) of what is dark, places on the board, counterclockwise; dots as polygons of the same
         area. A marker's bright cells lie in its dark square, clockwise."""

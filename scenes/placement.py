@@ -9,6 +9,8 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from scenes.board import PITCH, Board
+from scenes.cameras import estimated
+from scenes.cameras.estimated import Estimated
 from scenes.measurands.features import Centre, Side, Wall
 from scenes.measurands.form import forms_of
 from scenes.measurands.kinds import MEASURANDS
@@ -24,6 +26,7 @@ COMPONENTS = (
     *(f"part_tilt_deg.{axis}" for axis in "xyz"),
 )
 """What a placement is made of: a shift [length] and a rotation vector about ``camera.look_at`` [degrees]."""
+_RIDGE = 1e-18  # of deviations' variance: of some that a calibration knows to be one
 MOST_TILT = 15.0
 """Degrees that the part's place may be off to either side about all axes but one, where it is found in a picture."""
 
@@ -48,8 +51,14 @@ class Placement(Model):
     manufacture leaves open [length]."""
     board: Board | None = None
     """What stands beside the part; ``uncertainty.board_shift`` and ``board_tilt_deg`` say how exactly."""
-    expected: tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate] = (0.0,) * 6
-    """Shift along x, y, z [length] and rotation vector [degrees] that are expected, beside where the scene says."""
+    camera: tuple[Estimated, ...] = ()
+    """What of the camera is estimated in the same picture, with datums or a board: focal, its focal length or
+    magnification; with a board also k1, the first coefficient of its lens' distortion. How well that is known before
+    is what the scene says of the camera's numbers, or of their covariance; where it says nothing, to a tenth
+    (1 sigma) of the focal length, and to 0.1 of k1."""
+    expected: tuple[Coordinate, ...] = (0.0,) * 6
+    """Shift along x, y, z [length] and rotation vector [degrees] that are expected, beside where the scene says; then
+    of each of ``camera`` the deviation, of the focal length its logarithm."""
 
     @property
     def is_known(self) -> bool:
@@ -60,6 +69,11 @@ class Placement(Model):
     def is_estimated(self) -> bool:
         """Whether the picture tells it."""
         return self.source in ("datums", "board")
+
+    @property
+    def mean(self) -> np.ndarray:
+        """What is expected of shift, rotation vector and the camera's deviations, (6 + c,)."""
+        return np.array([*self.expected, *[0.0] * (6 + len(self.camera) - len(self.expected))])
 
     @property
     def features(self) -> tuple[str, ...]:
@@ -80,6 +94,24 @@ def prior(uncertainty: Uncertainty) -> np.ndarray:
     [1.0, 2.0, 3.0, 0.0, 0.0, 0.0]
     """
     return np.array([0.0 if told is None else told.u for told in uncertainty.of_part])
+
+
+def root(scene: Scene) -> np.ndarray:
+    """Deviations of variance 1 that are independent as those of a placement and the camera, (6 + c, k).
+
+    Of the placement's `COMPONENTS`, k of which are not exact, and of what is estimated of the camera.
+    """
+    u = prior(scene.uncertainty)
+    camera = np.linalg.cholesky(estimated.covariance(scene) + _RIDGE * np.eye(len(scene.placement.camera)))
+    whole = np.zeros((len(u) + len(camera),) * 2)
+    whole[:6, :6], whole[6:, 6:] = np.diag(u), camera
+    return whole[:, whole.any(0)]
+
+
+def components(scene: Scene) -> tuple[str, ...]:
+    """Names of the k deviations of `root`."""
+    known = zip(COMPONENTS, prior(scene.uncertainty) == 0, strict=True)
+    return (*(name for name, exact in known if not exact), *estimated.names(scene.placement.camera))
 
 
 def of_board(uncertainty: Uncertainty) -> np.ndarray:
@@ -115,6 +147,7 @@ def check_placement(scene: Scene) -> None:
     if placement.is_known:
         if any(placement.expected):
             raise ValueError(f"placement.expected must be 0 where it is known, got {list(placement.expected)}")
+        _check_camera(scene)
         return
     if not prior(scene.uncertainty).any():
         raise ValueError(
@@ -122,6 +155,7 @@ def check_placement(scene: Scene) -> None:
             ", got none"
         )
     _check_scene(scene)
+    _check_camera(scene)
     if placement.is_estimated:
         _check_tilts(scene)
     if placement.source == "datums":
@@ -143,6 +177,24 @@ def _check_scene(scene: Scene) -> None:
         curved = any(isinstance(feature, Wall) for feature in each.basic)
         if curved or MEASURANDS[each.kind].extreme or each in forms_of((each,)):
             raise ValueError(f"measurands must be of straight edges and circles {wrong}, got {each.name}")
+
+
+def _check_camera(scene: Scene) -> None:
+    placement = scene.placement
+    if placement.camera and not placement.is_estimated:
+        raise ValueError(
+            f"placement.camera must be left out unless placement.from is datums or board, got {list(placement.camera)}"
+        )
+    if len(set(placement.camera)) < len(placement.camera):
+        raise ValueError(f"placement.camera must have each once, got {list(placement.camera)}")
+    if "k1" in placement.camera and placement.source != "board":
+        raise ValueError("placement.camera must be without k1 unless placement.from is board, got it")
+    if "k1" in placement.camera and scene.camera.lens.kind != "brown_conrady":
+        raise ValueError(f"placement.camera must be without k1 of a {scene.camera.lens.kind} lens, got it")
+    if len(placement.expected) not in (6, len(placement.mean)):
+        raise ValueError(
+            f"placement.expected must be 6 numbers, and one of each of camera, got {len(placement.expected)}"
+        )
 
 
 def _check_datums(scene: Scene) -> None:

@@ -14,7 +14,7 @@ from imaging.models.bound import information, response
 from imaging.pictures import Pictures
 from imaging.placed import placed
 from scenes import Picture, Scene
-from scenes.placement import prior
+from scenes.placement import root
 
 MOST = np.array([5.0, 5.0, 2.0, 3.0, 3.0, 3.0])  # mm, degrees
 SENSOR, LIGHT = (28.0, 300.0), (22.0, 60.0)
@@ -86,11 +86,12 @@ def seen(picture: Picture, placement: np.ndarray) -> np.ndarray:
 
 
 def exact_information(picture: Picture) -> np.ndarray:
-    """What an image tells of the part's place, (6, 6), in units of what is known before; levels of faces left free.
+    """What an image tells of the part's place, and of what is estimated of the camera, (k, k), in units of what is
+    known before; levels of faces left free.
 
     From central differences of whole images of displaced parts, pixel by pixel, without lines, corners or slopes.
     """
-    steps = np.diag(prior(picture.scene.uncertainty)) * 1e-3
+    steps = root(picture.scene).T * 1e-3
     moved = [(seen(picture, step) - seen(picture, -step)).ravel() / 2e-3 for step in steps]
     model = information(Pictures.of(picture), reach=np.inf).model
     image_, slopes = model.evaluate(model.start())

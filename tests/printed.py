@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from imaging.geometry.projection import project_ideal
 from imaging.placed import placed
 from scenes import Board, Picture, Scene
-from scenes.placement import of_board
+from scenes.placement import of_board, root
 from tests import placements as parts
 
 CAMERA = {"width": 352, "height": 400, "look_at": [0, 16, 6]}
@@ -52,13 +52,38 @@ def scene(folder: Any, name: str, kind: str = "chessboard", **changes: Any) -> S
     return made.with_(**changes) if changes else made
 
 
+def estimated(scene: Scene, *which: str) -> Scene:
+    """A scene whose pictures tell so much of the camera, too: the focal length is known to 1 % before, k1 to 0.02."""
+    told = {"focal": ("camera.focal_px", 0.01 * scene.camera.focal_px), "k1": ("camera.lens.distortion[0]", 0.02)}
+    rows = [each.model_dump(exclude_none=True) for each in scene.uncertain]
+    rows += [{"key": told[name][0], "sd": told[name][1]} for name in which]
+    return scene.with_(placement={"camera": which}, uncertain=rows)
+
+
+def lenient(scene: Scene) -> Scene:
+    """A scene of wide tolerances: what a picture leaves open of the camera is told, and not refused."""
+    rows = [each.model_dump(exclude_none=True) | {"tolerance": 0.5} for each in scene.measurands]
+    return scene.with_(measurands=rows)
+
+
+def as_said(picture: Picture) -> Picture:
+    """The same picture by who takes the camera's numbers for what the scene says."""
+    return picture.with_scene(picture.scene.with_(placement={"camera": []}))
+
+
+def of_camera(picture: Picture, rng: np.random.Generator) -> np.ndarray:
+    """Deviations of what is estimated of the camera at random, normally, (c,)."""
+    return root(picture.scene)[6:] @ rng.standard_normal(root(picture.scene).shape[1])
+
+
 def place(picture: Picture, rng: np.random.Generator) -> np.ndarray:
-    """A place of the part at random, (6,); with a board such that all of it is in the picture, as far from the part
+    """A place of the part at random, (6,), and the camera's deviations after it; with a board such that all of it is in
+    the picture, as far from the part
     there as it has to be."""
     if picture.scene.placement.board is None:
-        return parts.drawn(rng, parts.MOST)
+        return np.append(parts.drawn(rng, parts.MOST), of_camera(picture, rng))
     while True:
-        there = parts.drawn(rng, parts.MOST * _WHOLE)
+        there = np.append(parts.drawn(rng, parts.MOST * _WHOLE), of_camera(picture, rng))
         if is_whole(placed(picture, there)) and is_clear(placed(picture, there)):
             return there
 

@@ -23,6 +23,7 @@ from planner.budgeting.station import Station
 from planner.budgeting.terms import BIAS, EXPANSION, MODEL, NOISE, PATTERN, ROUNDING, TEMPERATURE, TOGETHER
 from planner.uncertainty.groups import draw
 from scenes import Picture
+from scenes.cameras import estimated
 from scenes.placement import COMPONENTS
 from scenes.status import is_trusted
 from validation.stations import exposed
@@ -77,7 +78,7 @@ class Chain:
 
     def exact(self, errors: np.ndarray) -> np.ndarray:
         """Values (count, M) of draws (count, n) without what is added; bias by levels, and what datums leave of the
-        part's place, to first order."""
+        part's place and of the camera, to first order."""
         budget = self.budget
         first = np.array([source.kind == "brightness" or source.name in self._told for source in budget.sources], bool)
         placed = np.where(first, 0.0, errors)
@@ -88,7 +89,8 @@ class Chain:
     @property
     def _told(self) -> tuple[str, ...]:
         """Inputs that a picture tells itself, wherever the part lies: a measurement begins anew from there."""
-        return COMPONENTS if self.budget.picture.scene.placement.is_estimated else ()
+        placement = self.budget.picture.scene.placement
+        return (*COMPONENTS, *estimated.inputs(placement.camera)) if placement.is_estimated else ()
 
     @cached_property
     def expansion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

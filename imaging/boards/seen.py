@@ -20,7 +20,7 @@ from imaging.boards.fitting import crossing_rows
 from imaging.boards.saddle import response
 from imaging.boards.windows import Marked, windows
 from imaging.boards.windows import steps as ways
-from imaging.features.placing import steps
+from imaging.features.displaced import points_by_deviations
 from imaging.features.seen import Seen
 from imaging.geometry.blur import blur_at
 from imaging.geometry.lens import image_centre, lens_jacobian, recorded
@@ -30,14 +30,13 @@ from imaging.light.appearance import signal
 from imaging.pictures import Pictures
 from scenes import Board, Material, Scene
 from scenes.board import PITCH
-from scenes.placement import of_board, prior
+from scenes.placement import of_board, root
 
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
 CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
 NEEDED = f"no point of the board is found: it must be lit, in the picture, and {CLEAR:g} px beside the part there"
 _UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
 _EXACT = 1e-16  # px^2: of points without noise and print
-_UNITS = np.repeat([1.0, np.pi / 180], 3)  # of a placement's components: the scene's unit, and degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +106,12 @@ def seen_board(pictures: Pictures, seen: Seen) -> SeenBoard | None:
     if board is None:
         return None
     by_place = seen.slopes(board.points)  # (..., n, 2, 3)
-    moved = by_place @ (steps(board.points, np.array(seen.camera.look_at)) * _UNITS)
-    u = prior(said)
+    moved = points_by_deviations(board.points, pictures.sensors, pictures.scene)
     away = board.points - np.array(board.corner)
     by_pitch = np.einsum("...nij,nj->...ni", by_place, away / board.pitch)[..., None] * _pitch_u(pictures.scene)
-    beside = np.concatenate([moved * of_board(said), by_pitch], -1)
+    beside = np.concatenate([moved[..., :6] * of_board(said), by_pitch], -1)
     return SeenBoard(
-        slopes=moved[..., u > 0] * u[u > 0],
+        slopes=moved @ root(pictures.scene),
         noise=_noise(pictures, board),
         printed=board.point_sd**2 * by_place @ np.swapaxes(by_place, -1, -2),
         beside=beside,
@@ -136,7 +134,8 @@ def _noise(pictures: Pictures, board: Board) -> np.ndarray:
         size = noise / share**2
     unit = back @ _unit(pictures, board, places)[..., None, :, :] @ np.swapaxes(back, -1, -2)
     found = size[..., None, None] * unit
-    good = np.isfinite(found).all((-1, -2)) & (share > 0) & (_inside(places, camera) & _apart(pictures, board))
+    there = _inside(places, camera) & _apart(pictures, board)[..., None]
+    good = np.isfinite(found).all((-1, -2)) & (share > 0) & there
     return np.where(good[..., None, None], found, np.where(np.eye(2, dtype=bool), np.inf, 0.0))
 
 
@@ -181,17 +180,21 @@ def _inside(places: np.ndarray, camera) -> np.ndarray:
 
 
 def _apart(pictures: Pictures, board: Board) -> np.ndarray:
-    """Whether a side of the board has all of the part behind it in the picture, bool (..., 1)."""
-    camera = pictures.scene.camera
-    outline = from_axis(board.outline, pictures.sensors, camera)
-    part = from_axis(pictures.scene.solid.vertices, pictures.sensors, camera)
+    """Whether a side of the board has all of the part behind it in the picture, bool (...)."""
+    shown = (board.outline, pictures.scene.solid.vertices)
+    return apart(*(from_axis(each, pictures.sensors, pictures.scene.camera) for each in shown))
+
+
+def apart(outline: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Whether a side of a board's image (..., 4, 2) has all points of a part's image (..., n, 2) `CLEAR` px beyond it,
+    bool (...)."""
     side = np.roll(outline, -1, -2) - outline
     normal = np.stack([side[..., 1], -side[..., 0]], -1)
     normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
     away = np.einsum("...si,...spi->...sp", normal, part[..., None, :, :] - outline[..., :, None, :])
     middle = np.einsum("...si,...si->...s", normal, outline.mean(-2, keepdims=True) - outline)
     beyond = -np.sign(middle)[..., None] * away
-    return (beyond > CLEAR).all(-1).any(-1)[..., None]
+    return (beyond > CLEAR).all(-1).any(-1)
 
 
 def _unit(pictures: Pictures, board: Board, places: np.ndarray) -> np.ndarray:

@@ -16,12 +16,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from imaging.bundles.cameras import by_camera
 from imaging.bundles.in_space import InSpace
 from imaging.bundles.told import Told
 from imaging.bundles.unknowns import Freedom, Unknowns, rim, rim_moves
+from imaging.features.displaced import around, by_camera, by_place, of_circle, rim_fit, rim_normals, steps
 from imaging.features.measurand import measurands
-from imaging.features.placing import around, by_place, of_circle, rim_fit, rim_normals, steps, whitening
+from imaging.features.placing import whitening
 from imaging.features.seen import Seen
 from imaging.geometry.projection import from_axis
 from imaging.pictures import Pictures
@@ -306,3 +306,8 @@ def _check(pictures: tuple[Picture, ...]) -> None:
             )
     if first.placement.board is not None:
         raise InvalidInput("placement.from must be known, uncertain or datums for several pictures, got 'board'")
+    if first.placement.camera:
+        raise InvalidInput(
+            "placement.camera must be left out of several pictures, where the covariance says what is unknown, got "
+            f"{list(first.placement.camera)}"
+        )

@@ -6,7 +6,7 @@ import numpy as np
 
 from imaging.bundles.bundle import BundleAdjustment
 from imaging.bundles.told import Told
-from imaging.features.placing import steps
+from imaging.features.displaced import steps
 from imaging.geometry.projection import sensor_position
 
 _MANY = 0.3  # of the block that is open most: others as open are named, too

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from imaging.bundles.cameras import root
-from imaging.features.placing import around
+from imaging.features.displaced import around
 from imaging.features.seen import Seen
 from imaging.geometry.projection import camera_frame, sensor_position
 from imaging.pictures import Pictures

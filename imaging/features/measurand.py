@@ -24,7 +24,7 @@ from imaging.pictures import Pictures
 from scenes import Centre, Corner, Quantity, Scene, Task
 from scenes.measurands.features import is_line
 from scenes.measurands.form import forms_of
-from scenes.placement import prior
+from scenes.placement import components
 
 __all__ = ["Measurand", "Measurands", "corner_response", "measurand", "measurands", "normals", "required_edges"]
 
@@ -189,7 +189,7 @@ def expected(pictures: Pictures, view: ProjectedEdges) -> Seen:
         half_angles=np.broadcast_to(np.array([half_angle_of(rim) for rim in rims]), (*lead, len(rims))),
         expected=True,
         forms={quantity: np.zeros(lead) for quantity in forms_of(scene.quantities)},
-        board=0 if scene.placement.board is None else int((prior(scene.uncertainty) > 0).sum()),
+        board=0 if scene.placement.board is None else len(components(scene)),
     )
 
 

@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from imaging.features.displaced import by_deviations
 from imaging.features.seen import Seen
-from scenes import Circle, Quantity, Scene, Side
+from scenes import Quantity, Scene, Side
 from scenes.measurands.features import ends_of
-from scenes.placement import COMPONENTS, datums_of, prior
+from scenes.placement import COMPONENTS, components, datums_of, root
 from scenes.status import OF_SIGMA, OF_TOLERANCE
 
 if TYPE_CHECKING:
     from imaging.boards.seen import SeenBoard
 
-_AROUND = 64  # points of a circle
 _NOISELESS = 1e-4  # of a feature's variance, in a combination of some; what is told of a placement has 3e-3 and more
 
 
@@ -36,13 +36,13 @@ class Placing:
     Attributes
     ----------
     names : tuple of str
-        Of the components (`scenes.placement.COMPONENTS`).
-    u : ndarray, shape (k,)
-        Their standard uncertainties before, the scene's unit, degrees.
+        Of the components (`scenes.placement.components`).
+    root : ndarray, shape (6 + c, k)
+        Placement (the scene's unit, degrees) and deviations of the camera by them (`scenes.placement.root`).
     expected : ndarray, shape (k,)
-        Their expectation, in units of those.
+        Their expectation.
     slopes : ndarray, shape (..., q, k)
-        J, by the components in units of those.
+        J, by the components.
     features : tuple of str
         Names of the datums, or of the board.
     datums : ndarray of bool, shape (q,)
@@ -56,7 +56,7 @@ class Placing:
     """
 
     names: tuple[str, ...]
-    u: np.ndarray
+    root: np.ndarray
     expected: np.ndarray
     slopes: np.ndarray
     features: tuple[str, ...]
@@ -70,11 +70,9 @@ class Placing:
         """That of a scene's features, and its board's points, as they are expected; None where their place is known."""
         if scene.placement.is_known:
             return None
-        u = prior(scene.uncertainty)
-        free = np.flatnonzero(u > 0)
-        steps = np.where(np.arange(6) < 3, 1.0, np.pi / 180) * u
+        told = root(scene)
         with np.errstate(divide="ignore", invalid="ignore"):
-            slopes = by_place(seen)[..., free] * steps[free]
+            slopes = by_deviations(seen, scene) @ told
             datums, scatter = _datums(scene, seen)
         lead = (
             slopes.shape[:-2] if board is None else board.root.shape[:-2]
@@ -85,9 +83,9 @@ class Placing:
             part = seen.of_board
             slopes[..., part, :], datums[part] = board.root, True
             scatter[..., part, part], beside[..., part, part] = board.spread(board.printed), board.of_beside
-        expected = np.array(scene.placement.expected)[free] / u[free]
-        names = tuple(COMPONENTS[i] for i in free)
-        return cls(names, u[free], expected, slopes, scene.placement.told_by, datums, scatter, beside, board)
+        expected = np.linalg.pinv(told) @ scene.placement.mean
+        told_by = scene.placement.told_by
+        return cls(components(scene), told, expected, slopes, told_by, datums, scatter, beside, board)
 
     def squares(self, errors: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Chi-square (...) of what the best placement leaves of features found (..., q), and degrees of freedom."""
@@ -103,7 +101,7 @@ class Placing:
         told, white = self._whitening(errors)
         slopes = white @ self._told_slopes(told)
         information = np.swapaxes(slopes, -1, -2) @ slopes
-        posterior = np.linalg.inv(information + np.eye(len(self.u)))
+        posterior = np.linalg.inv(information + np.eye(len(self.names)))
         return Adjustment(self, information, posterior, posterior @ np.swapaxes(slopes, -1, -2) @ white)
 
     def _told_slopes(self, told: np.ndarray) -> np.ndarray:
@@ -160,8 +158,8 @@ class Adjustment:
         return told + np.einsum("...kl,l->...k", self.posterior, self.placing.expected)
 
     def covariance(self) -> np.ndarray:
-        """Of its components, (..., k, k), the scene's unit and degrees, squared."""
-        return self.posterior * np.outer(self.placing.u, self.placing.u)
+        """Of placement and the camera's deviations, (..., 6 + c, 6 + c), the scene's unit and degrees, squared."""
+        return self.placing.root @ self.posterior @ self.placing.root.T
 
     def gradient(self, gradient: np.ndarray) -> np.ndarray:
         """Derivatives of adjusted values by features, (..., M, q), from those at a known placement."""
@@ -212,83 +210,20 @@ class Adjustment:
 
     def guilty(self, gradient: np.ndarray) -> str:
         """The component that has most of the direction which matters most to one value of one picture, by its
-        gradient (q,)."""
+        gradient (q,); with the camera's, all that cannot be told from each other."""
         left = self._untold(gradient[None])[0]
         direction = self._directions[1][:, int(np.abs(left).argmax())]
-        return self.placing.names[int(np.abs(direction).argmax())]
+        first, names = int(np.abs(direction).argmax()), self.placing.names
+        if set(names) <= set(COMPONENTS):
+            return names[first]
+        moves = np.abs(self.pulls(gradient[None])[0] * direction)
+        return " or ".join(name for i, name in enumerate(names) if i == first or moves[i] > moves.max() / 2)
 
     def _untold(self, gradient: np.ndarray) -> np.ndarray:
         """What each direction adds, (..., M, k)."""
         sizes, directions = self._directions
         weak = np.where(sizes < 1, 1 / (1 + np.maximum(sizes, 0.0)), 0.0)
         return (self.pulls(gradient) @ directions) * weak[..., None, :]
-
-
-def by_place(seen: Seen, pivot: np.ndarray | None = None) -> np.ndarray:
-    """Derivatives of lines and circles by shifts and turns (rad) of the part, (..., q, 6); 0 of forms.
-
-    It turns about a pivot (3,), the point that the camera looks at where none is given.
-    """
-    pivot = np.array(seen.camera.look_at) if pivot is None else pivot
-    found = np.zeros((*seen.sensors.shape[:-1], seen.count, 6))
-    lengths = np.linalg.norm(seen.along, axis=-1)[..., None]
-    for e, name in enumerate(seen.names):
-        ends = seen.solid.vertices[list(seen.solid.edge(name).ends)]
-        off = np.einsum("...i,...nij->...nj", seen.normals[..., e, :], _moved(seen, ends, pivot))
-        found[..., 2 * e, :] = off[..., 0, :]
-        found[..., 2 * e + 1, :] = (off[..., 1, :] - off[..., 0, :]) / lengths[..., e, :]
-    for c, name in enumerate(seen.circles):
-        circle = seen.solid.circle(name)
-        found[..., seen.numbers(c), :] = of_circle(seen, circle, steps(circle.at(around(circle)), pivot))
-    return found
-
-
-def _moved(seen: Seen, points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
-    """Derivatives of the images of points (n, 3) by the placement, px, (..., n, 2, 6)."""
-    return seen.slopes(points) @ steps(points, pivot)
-
-
-def steps(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
-    """How points (n, 3) of a part move with its shift and turn about a pivot, (n, 3, 6)."""
-    turned = np.cross(np.eye(3), (points - pivot)[:, None, :])  # (n, axis, 3)
-    return np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), np.swapaxes(turned, 1, 2)], -1)
-
-
-def of_circle(seen: Seen, circle: Circle, moves: np.ndarray) -> np.ndarray:
-    """Derivatives of a circle's shifts and radius, (..., 3, k), where `around` of it is moved by ``moves`` (n, 3, k):
-    least squares around its rim, as it is found."""
-    across, solve = rim_fit(seen, circle)
-    return solve @ np.einsum("...nj,njk->...nk", across, moves)
-
-
-def rim_fit(seen: Seen, circle: Circle) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of how far the image of `around` a circle is off outwards by these places, px, (..., n, 3), and of
-    the circle's shifts and radius by how far that is, (..., 3, n)."""
-    normal, slopes, speed, radial = _outwards(seen, circle)
-    one, two = circle.axes
-    across = np.einsum("...ni,...nij->...nj", normal, slopes)
-    design = np.stack([across @ one, across @ two, np.einsum("...nj,nj->...n", across, radial)], -1)
-    weighted = np.swapaxes(design * speed, -1, -2)
-    return across, np.linalg.solve(weighted @ design, weighted)
-
-
-def rim_normals(seen: Seen, circle: Circle) -> np.ndarray:
-    """Unit normals of its image at `around` of it, outwards, (..., n, 2)."""
-    return _outwards(seen, circle)[0]
-
-
-def around(circle: Circle) -> np.ndarray:
-    """Angles of the places of a circle by which its image is told, rad, (n,)."""
-    return circle.angles(_AROUND)
-
-
-def _outwards(seen: Seen, circle: Circle) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of `around`: unit normals of the image, its derivatives by the places, px per rad around, and unit spokes."""
-    points, radial = circle.at(around(circle)), circle.spokes(around(circle))
-    slopes = seen.slopes(points)
-    along = np.einsum("...nij,nj->...ni", slopes, np.cross(circle.axis, radial))
-    speed = np.linalg.norm(along, axis=-1, keepdims=True)
-    return np.stack([along[..., 1], -along[..., 0]], -1) / speed, slopes, speed, radial
 
 
 def _datums(scene: Scene, seen: Seen) -> tuple[np.ndarray, np.ndarray]:

@@ -13,10 +13,10 @@ from scipy.special import chdtrc
 
 from imaging.boards.seen import SeenBoard, leaning, levels, marked_beside
 from imaging.boards.windows import steps as ways
-from imaging.features.placing import steps
+from imaging.features.displaced import points_by_deviations
 from imaging.geometry.blur import blur_at
 from imaging.geometry.lens import lens_jacobian, undistorted
-from imaging.geometry.projection import depth, jacobian_ideal, project, project_ideal
+from imaging.geometry.projection import depth, project, project_ideal
 from imaging.pictures import Pictures
 from imaging.placed import combined, placed
 from imaging.sensor import recorded
@@ -27,11 +27,12 @@ from measure.boards.eccentricity import centroid
 from measure.boards.printed import Printed
 from measure.goodness import WORST
 from scenes import Board, InvalidInput, Picture, status
-from scenes.placement import limits, prior
+from scenes.placement import limits, root
 
 _FEWEST = 6  # points that a board is told by
 _STEPS, _FAR = 10, 2.0  # of Gauss and Newton; px that a board's points are left off by at most
-_HELD = 1e-3  # px: of a placement of one standard uncertainty, where points do not tell it
+_HELD = 0.02  # px: of a placement of one standard uncertainty, about what a point is known to
+_OTHER = 0.5  # of the focal length's logarithm, or k1: another camera, which points in a wrong order ask for
 _BEYOND = 1.25  # of what is plausible: where noise may take a place that is hardly told
 _WIDE = 4  # px that a lens may bend a board's sides by, or more
 _AROUND = 96  # places on a dot's outline
@@ -65,23 +66,23 @@ def find_board(images: np.ndarray, picture: Picture, told: SeenBoard) -> FoundBo
 
 
 def by_board(image: np.ndarray, picture: Picture) -> tuple[np.ndarray | None, float]:
-    """The placement (6,) at which a picture's board is seen where an image (height, width) has it, to some tenths of a
-    px, and the share of its points that are found; None where there is none within what is plausible.
+    """The placement (6 + c,) at which a picture's board is seen where an image (height, width) has it, to some tenths
+    of a px, and the share of its points that are found; None where there is none within what is plausible.
 
     The board may be seen from any side: the order of its points is that of the least placement.
     """
-    board, camera = picture.scene.placement.board, picture.scene.camera
+    board = picture.scene.placement.board
     try:
         found = _printed(board).measured(image)
     except InvalidInput:
         return None, 0.0
-    grid = undistorted(found.corners, camera).reshape(*found.shape[::-1], 2)
+    grid = found.corners.reshape(*found.shape[::-1], 2)
     columns, rows = board.shape
     turned = [np.rot90(each, k) for each in (grid, grid[::-1]) for k in range(4)]
     turned = [grid[::-1]] if board.kind == "charuco" else turned  # OpenCV numbers its corners from the upper left
     each = [_nearest(picture, there) for there in turned if there.shape[:2] == (rows, columns)]
     most = _BEYOND * limits(picture.scene.uncertainty) + 1e-9
-    good = [(left, place) for left, place in each if left < _FAR and (np.abs(place) <= most).all()]
+    good = [(left, place) for left, place in each if left < _FAR and (np.abs(place[:6]) <= most).all()]
     return (min(good, key=lambda one: one[0])[1] if good else None), float(found.measured.mean())
 
 
@@ -93,25 +94,22 @@ def _printed(board: Board) -> Printed:
 
 
 def _nearest(picture: Picture, grid: np.ndarray) -> tuple[float, np.ndarray]:
-    """Gauss-Newton from where the scene says: what is left between points and ideal places (rows, columns, 2), root
-    mean square px, and the placement."""
-    u = prior(picture.scene.uncertainty)
-    free, here, left = np.flatnonzero(u > 0), np.zeros(6), np.inf
-    wanted = grid.reshape(-1, 2)
+    """Gauss-Newton from where the scene says: what is left between points and recorded places (rows, columns, 2), root
+    mean square ideal px, and the placement."""
+    free, left = root(picture.scene), np.inf
+    here, held = np.zeros(len(free)), _HELD * np.eye(free.shape[1])
     for _ in range(_STEPS):
         there = placed(picture, here)
         points, sensor = there.scene.placement.board.points, np.array(list(there.sensor))
+        wanted = undistorted(grid.reshape(-1, 2), there.scene.camera)
         off = wanted - project_ideal(points, sensor, there.scene.camera)
         good = np.isfinite(off).all(1)
-        if good.sum() < _FEWEST:
+        if good.sum() < _FEWEST or np.abs(here[6:]).max(initial=0.0) > _OTHER:
             return np.inf, here
         left = float(np.sqrt((off[good] ** 2).sum(1).mean()))
-        by_place = steps(points, np.array(there.scene.camera.look_at)) * np.repeat([1.0, np.pi / 180], 3)
-        rows = (jacobian_ideal(points, sensor, there.scene.camera) @ by_place)[good][..., free] * u[free]
-        rows = np.concatenate([rows.reshape(-1, free.size), _HELD * np.eye(free.size)])
-        step = np.zeros(6)
-        step[free] = np.linalg.lstsq(rows, np.append(off[good], np.zeros(free.size)), rcond=None)[0] * u[free]
-        here = combined(here, step)
+        rows = (points_by_deviations(points, sensor, there.scene) @ free)[good].reshape(-1, len(held))
+        wanted = np.append(off[good], held @ np.linalg.pinv(free) @ there.scene.placement.mean)
+        here = combined(here, free @ np.linalg.lstsq(np.concatenate([rows, held]), wanted, rcond=None)[0])
     return left, here
 
 

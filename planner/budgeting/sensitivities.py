@@ -18,6 +18,7 @@ from imaging.models.bias import bias
 from planner.budgeting.features import Features
 from planner.budgeting.sources import Source
 from planner.budgeting.station import Station
+from scenes.placement import COMPONENTS
 
 STEP = 1e-5  # of an input's scale
 
@@ -58,8 +59,8 @@ def _by_placement(features: Features) -> dict[str, np.ndarray]:
     if known.placing is None or not known.datums:
         return {}
     adjustment = variance_model(DEFAULT_MODEL)(features.pictures).adjustment
-    left = adjustment.left(known.gradient_object) / adjustment.placing.u
-    return dict(zip(adjustment.placing.names, left.T, strict=True))
+    left = adjustment.left(known.gradient_object) @ np.linalg.pinv(adjustment.placing.root)
+    return {name: left[:, i] for i, name in enumerate(COMPONENTS)}
 
 
 def by_geometry(features: Features, here: Station, given: Sequence[Source]) -> np.ndarray:

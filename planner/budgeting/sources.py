@@ -12,6 +12,7 @@ from planner.budgeting.station import Station
 from planner.uncertainty.inputs import Input
 from scenes import Scene, Uncertain
 from scenes.board import PITCH
+from scenes.cameras import estimated
 from scenes.numbers import number_at, with_number
 from scenes.placement import COMPONENTS
 
@@ -78,7 +79,8 @@ class Source(Believed):
 
 def sources(scene: Scene) -> tuple[Source, ...]:
     """All inputs that move what a picture shows; temperature, rounding and the like are not among them."""
-    return (*_numbers(scene), *_poses(scene), *_carried(scene), *_calibrated(scene), *_influences(scene))
+    of_camera = (*_calibrated(scene), *_estimated(scene))
+    return (*_numbers(scene), *_poses(scene), *_carried(scene), *of_camera, *_influences(scene))
 
 
 def _influences(scene: Scene) -> Iterator[Source]:
@@ -170,6 +172,14 @@ def _calibrated(scene: Scene) -> Iterator[Source]:
             key = f"camera.lens.distortion[{place}]"
             move = _number_moved(key)
             yield Source(name, number_at(scene, key), told, "", "geometry", 1e-2, move)
+
+
+def _estimated(scene: Scene) -> Iterator[Source]:
+    """What a picture is to tell of the camera and the scene says nothing of before."""
+    which, told = scene.placement.camera, Uncertain(sd=estimated.UNTOLD)
+    for name, of_camera, untold in zip(estimated.names(which), which, estimated.is_untold(scene), strict=True):
+        move = _stretched(1.0, (0, 1)) if of_camera == "focal" else _number_moved(estimated.K1)
+        yield from _one(name, told if untold else None, "", "geometry", 1e-2, move)
 
 
 def _stretched(focal: float, axes: tuple[int, ...]) -> Callable[[Station, float], Station]:

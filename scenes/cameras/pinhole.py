@@ -175,6 +175,14 @@ class Camera(Model):
         """The same camera elsewhere on its axis, its lens set as before; unchecked."""
         return self.tried(distance=distance)
 
+    def enlarged(self, factor: float) -> Self:
+        """The same camera with a focal length by so much longer; unchecked."""
+        changes, focal, pitch = {"focal_px": factor * self.focal_px}, self.focal_length_mm, self.pixel_pitch_um
+        if focal is not None and pitch is not None:  # 1 / focal length = 1 / distance + 1 / image distance
+            image = self.focal_px * pitch / 1000
+            changes["focal_length_mm"] = 1 / (1 / focal - 1 / image + 1 / (factor * image))
+        return self.tried(**changes)
+
     @field_validator("relative_illumination")
     @classmethod
     def _outward(cls, rows: Any) -> Any:

@@ -121,6 +121,10 @@ class Telecentric(Camera):
         moved = self.divisor(self.distance) + self.perspective * (distance - self.distance)
         return self.tried(distance=distance, focal_px=self.focal_px * distance / moved)
 
+    def enlarged(self, factor: float) -> Self:
+        """The same camera with a magnification by so much larger; unchecked."""
+        return self.tried(focal_px=factor * self.focal_px, magnification=factor * self.magnification)
+
     def depth_of_field(self, circle_px: NotNegative) -> float:
         """Length along the axis within which no circle of confusion is wider than a diameter, scene units."""
         aside = circle_px * self.distance / self.focal_px  # on the part

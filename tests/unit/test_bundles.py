@@ -13,10 +13,11 @@ import render
 import scenes
 from imaging.blurred.whole import image
 from imaging.bundles.bundle import Bundle
-from imaging.bundles.cameras import by_camera, root
+from imaging.bundles.cameras import root
 from imaging.bundles.preferred import Preferred
 from imaging.bundles.told import Told
 from imaging.bundles.unknowns import Freedom
+from imaging.features.displaced import by_camera
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.budgeting.bundles import bundle_budget

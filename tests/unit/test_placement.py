@@ -146,7 +146,7 @@ def test_slopes_of_circles_are_what_a_fit_through_the_moved_rim_gives():
         flat = np.concatenate(
             [circle.centre + circle.radius * (np.cos(angle)[:, None] * one + np.sin(angle)[:, None] * two)]
         )
-        for i, u in enumerate(placing.u):
+        for i, u in enumerate(np.diag(placing.root)):
             step = np.eye(6)[i] * 1e-4
             turned = Rotation.from_rotvec(step[3:], degrees=True).apply(flat - pivot) + pivot + step[:3]
             off = ((project(turned, sensor, scene.camera) - here) * normal).sum(1) / 1e-4 * weight

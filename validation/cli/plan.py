@@ -38,7 +38,7 @@ _CHECKED, _MOST_CHECKED = 10, 1000
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered in a second or so
 _NOT_CAPABILITY = (
     "--over", "--search", "--model", "--edges", "--start", "--shares", "--tolerance", "--check", "--map", "--out",
-    "--views", "--views-share", "--vary", "--hold", "--write", "--certify",
+    "--views", "--views-share", "--vary", "--hold", "--write", "--certify", "--place-board",
 )  # fmt: skip
 _NOT_COVERAGE = tuple(each for each in _NOT_CAPABILITY if each != "--model")
 
@@ -132,6 +132,10 @@ class Options:
     write: Annotated[
         bool, typer.Option("--write", help="Put the poses into the scene's file, first of its settings; comments stay.")
     ] = False
+    place_board: Annotated[
+        bool,
+        typer.Option("--place-board", help="Find where the scene's board should stand, and how large it should be."),
+    ] = False
     views: Annotated[int | None, typer.Option(metavar="N", help="Plan 1 to N pictures that together measure best.")] = (
         None
     )
@@ -184,7 +188,7 @@ class Planned:
 def plan_command(given: Options) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
     import planner
-    from validation.cli import plan_capability, plan_views
+    from validation.cli import plan_board, plan_capability, plan_views
 
     _check_options(given)
     poses = {name: parse_poses(f"--{name}", getattr(given, name)) for name in ("sensor", "light")}
@@ -205,6 +209,9 @@ def plan_command(given: Options) -> None:
         _say_coverage(found, seconds, given.as_json)
         raise typer.Exit(1 if found.lost else 0)
     how |= {"over": given.over, "model": given.model}
+    if given.place_board:
+        plan_board.run(scene, given, how, target)
+        return
     if given.several:
         plan_views.run(scene, given, how, checked=bool(count))
         _say_unchecked(scene, given, count)
