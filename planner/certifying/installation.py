@@ -21,7 +21,8 @@ from scenes.status import WORST_FIRST, is_trusted
 
 TUR = 4.0  # half the tolerance over U: what counts as precise enough
 LARGEST = 30.0  # degrees: what is farther off is no error of installation
-MOST_PAIRS = 400_000  # of cells
+_LEAST = 1e-3  # degrees: less is no box
+MOST_PAIRS = 50_000  # of cells, of each box that is tried: some seconds
 _SHARES = (0.99, 0.97, 0.94, 0.88, 0.75, 0.5, 0.25, 0.1)  # of the least errors known to be too large, tried in turn
 _TRIED = 200  # poses of a box that is tried, beside its corners and middles
 _STEPS = 16  # of bisection
@@ -182,7 +183,7 @@ class _Search:
         grid = np.array(list(product((-1.0, 0.0, 1.0), repeat=4)))
         self._bisect(np.concatenate([grid, np.random.default_rng(_SEED).uniform(-1, 1, (_TRIED, 4))]))
         steps = list(_SHARES)
-        while steps:
+        while steps and self.too_large > _LEAST:
             size = min(steps.pop(0) * self.too_large, LARGEST)
             told = Within(self.demand, *self.ranges(size)).proved(self.most, self.report)
             self.pairs += told.pairs
@@ -259,9 +260,8 @@ class _Search:
 
 def _why(picture: Picture, demand: Demand) -> str:
     """What is wrong in a picture: a status, or a U that is too large."""
-    poses = (
-        np.array([list(pose)], float) for pose in (picture.sensor, *(picture.lights[i] for i in picture.scene.free))
-    )
+    (light,) = (picture.lights[which] for which in picture.scene.free)
+    poses = (np.array([list(pose)], float) for pose in (picture.sensor, light))
     for rank, each in zip(demand.at(*poses)[1][0], predict(picture).measurands, strict=True):
         if not is_trusted(WORST_FIRST[rank]):
             return f"{each.name} {WORST_FIRST[rank]}" + (f" ({each.reason})" if each.reason else "")
