@@ -83,7 +83,7 @@ class Demand:
         pictures = Pictures.of(self.scene, sensors, lights)
         evaluated = variance_model("calibrated")(pictures)
         polar, azimuth = (np.radians(np.repeat(sensors[:, k : k + 1], 2, 1)) for k in (0, 1))
-        u2 = self.u2(evaluated.variances_object, self.inputs.of(polar, azimuth))
+        u2 = self.u2(evaluated.variances_object, self.inputs.of(polar, azimuth)[0])
         return u2, quantity_ranks(evaluated, np.zeros(evaluated.contrast.shape[-1], bool))
 
     def is_met(self, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:

@@ -157,15 +157,17 @@ class InputTerms:
         each = [member for source in shared_inputs(self.scene, self.given) for member in members(source)]
         return min((one.dof for one in each if one.u > 0), default=np.inf)
 
-    def of(self, polar: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-        """Upper bounds in cells (n, 2), (n, 2), rad, shape (n, M)."""
+    def of(self, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Upper bounds in cells (n, 2), (n, 2), rad, and how far above the values in the middle, (n, M) each."""
         view = View.of(self.scene, polar, azimuth, np.zeros(len(self.scene.solid.faces), bool))
         level = variables(polar, azimuth)[0]
         names = [each.name for each in self.given if each.kind == "geometry"]
         with np.errstate(all="ignore"):  # what is not bounded
-            return np.stack([self._variance(view, level, pulls, names) for pulls in self.pulls], -1)
+            found = [self._variance(view, level, pulls, names) for pulls in self.pulls]
+        high, middle = (np.stack([getattr(each, name) for each in found], -1) for name in ("high", "middle"))
+        return high, np.fmax(high - middle, 0.0)
 
-    def _variance(self, view: View, polar: Enclosed, pulls: list[Pull], names: list[str]) -> np.ndarray:
+    def _variance(self, view: View, polar: Enclosed, pulls: list[Pull], names: list[str]) -> Enclosed:
         slopes = dict.fromkeys(names, polar * 0.0)
         if names:
             for pull in pulls:
@@ -179,7 +181,7 @@ class InputTerms:
                 if own in slopes and other in slopes:
                     product = slopes[own].square() if own == other else slopes[own] * slopes[other]
                     whole = whole + product * v
-        return whole.high
+        return whole
 
 
 def _covariances(source) -> list[tuple[str, str, float]]:

@@ -12,7 +12,8 @@ from imaging.models import variance_model
 from imaging.pictures import Pictures
 from planner.budgeting.budgets import budget
 from planner.certifying.demand import Demand
-from planner.certifying.within import Ranges, Told, Within
+from planner.certifying.pose_box import PoseBox
+from planner.certifying.within import Pair, Told, Within
 from planner.prediction import predict
 from planner.search.objective import Report
 from scenes import InvalidInput, Picture, Pose, Scene
@@ -21,7 +22,7 @@ from scenes.status import WORST_FIRST, is_trusted
 
 TUR = 4.0  # half the tolerance over U: what counts as precise enough
 LARGEST = 30.0  # degrees: what is farther off is no error of installation
-_LEAST = 1e-3  # degrees: less is no box
+_LEAST = 1e-3 / LARGEST  # less is no box
 MOST_PAIRS = 50_000  # of cells, of each box that is tried: some seconds
 _SHARES = (0.99, 0.97, 0.94, 0.88, 0.75, 0.5, 0.25, 0.1)  # of the least errors known to be too large, tried in turn
 _TRIED = 200  # poses of a box that is tried, beside its corners and middles
@@ -53,9 +54,8 @@ class InstallationBox:
     ----------
     picture : Picture
         With the poses in the middle.
-    sensor_deg, light_deg : float
-        Largest errors along the meridian and along the circle of latitude, each to both sides. Beside a pole the box
-        holds all azimuths.
+    poses : PoseBox
+        Those of which all is proved.
     k : float
         U is asked to be at most half of each tolerance zone over this.
     p : float
@@ -71,8 +71,7 @@ class InstallationBox:
     """
 
     picture: Picture
-    sensor_deg: float
-    light_deg: float
+    poses: PoseBox
     k: float
     p: float
     limits: tuple[float, ...]
@@ -80,6 +79,16 @@ class InstallationBox:
     share: float
     limited_by: Limiting | None
     pairs: int
+
+    @property
+    def sensor_deg(self) -> float:
+        """Largest error of the sensor along the meridian and, independently, along the circle of latitude."""
+        return float(self.poses.off[0])
+
+    @property
+    def light_deg(self) -> float:
+        """The same of the light."""
+        return float(self.poses.off[1])
 
     @property
     def told(self) -> str:
@@ -128,11 +137,9 @@ def installation_box(
     Examples
     --------
     >>> import scenes
-    >>> task1 = scenes.load("task1")
-    >>> asked = task1.with_(task=task1.task.with_(tolerance=0.15))
-    >>> box = installation_box(asked, (30, 135), (15, 315), k=2)
-    >>> box.sensor_deg == box.light_deg, box.share > 0.9
-    (True, True)
+    >>> box = installation_box(scenes.load("calibrated_rig"), (10, 60), (10, 25), k=6)
+    >>> round(box.sensor_deg, 1), round(box.share, 2), box.limited_by.why
+    (0, 0, '')
     """
     picture, k = Picture.of(scene, sensor, light), number(k, "k")
     if not k > 0:
@@ -140,14 +147,24 @@ def installation_box(
     if not 0 < number(p, "p") < 1:
         raise InvalidInput(f"p must be between 0 and 1, got {p:g}")
     limits = np.array([_half(quantity) for quantity in picture.scene.quantities]) / k
-    search = _Search(picture, Demand.of(picture, limits, p), most, report or (lambda *_: None))
+    demand = Demand.of(picture, limits, p)
+    search = _Search.of(picture, demand, most, report or (lambda *_: None))
+    if not demand.is_met(*search.whole.times(0.0).at(np.zeros((1, 4))))[0]:
+        raise InvalidInput(f"poses must keep what is asked before any error for a box, got {_why(picture, demand)}")
     told = search.run()
-    U = np.sqrt(told.most) * limits
-    shape, size, least = search.shape * search.size, search.size, search.too_large
+    share = search.factor / search.too_large if search.against else 1.0
     return InstallationBox(
-        picture, float(shape[0]), float(shape[1]), k, p, tuple(limits.tolist()), tuple(U.tolist()),
-        size / least if np.isfinite(least) else 1.0, search.limiting(), search.pairs,
+        picture, search.whole.times(search.factor), k, p, tuple(limits.tolist()),
+        tuple((np.sqrt(told.most) * limits).tolist()), share, _limiting(picture.scene, demand, search.against),
+        search.pairs,
     )  # fmt: skip
+
+
+def _limiting(scene: Scene, demand: Demand, against: Pair | None) -> Limiting | None:
+    if against is None:
+        return None
+    sensor, light = (Pose(*map(float, pose)) for pose in against)
+    return Limiting(sensor, light, _why(Picture.of(scene, sensor, light), demand))
 
 
 def _half(quantity) -> float:
@@ -158,104 +175,72 @@ def _half(quantity) -> float:
 
 @dataclass
 class _Search:
-    """Of the largest box: by its size, degrees, of which ``shape`` makes both errors."""
+    """Of the largest box, so many times that of ``LARGEST``.
 
-    picture: Picture
+    Attributes
+    ----------
+    factor, too_large : float
+        Of the box that is proved, and of the least one that is known to hold a pose ``against`` it.
+    pairs : int
+        Pairs of cells that were bounded.
+    """
+
+    whole: PoseBox
     demand: Demand
     most: int
     report: Report
+    factor: float = 0.0
     too_large: float = np.inf
-    against: np.ndarray | None = None
-    size: float = 0.0
+    against: Pair | None = None
     pairs: int = 0
 
-    def __post_init__(self) -> None:
-        said = self.picture.scene.uncertainty
-        ratio = [1.0 if told is None or told.u == 0 else told.u for told in (said.sensor_deg, said.light_deg)]
-        ratio = [1.0, 1.0] if said.sensor_deg is None or said.light_deg is None else ratio
-        self.shape = np.array(ratio) / max(ratio)
-        (light,) = (self.picture.lights[which] for which in self.picture.scene.free)
-        self.middle = np.array([*self.picture.sensor, *light], float)
+    @classmethod
+    def of(cls, picture: Picture, demand: Demand, most: int, report: Report) -> _Search:
+        """About a picture's poses, errors of both alike or as the scene has them."""
+        said = (picture.scene.uncertainty.sensor_deg, picture.scene.uncertainty.light_deg)
+        off = np.array([0.0 if told is None else told.u for told in said])
+        off = off / off.max() if off.all() else np.ones(2)
+        (light,) = (picture.lights[which] for which in picture.scene.free)
+        return cls(PoseBox(np.array([*picture.sensor, *light], float), LARGEST * off), demand, most, report)
 
     def run(self) -> Told:
         """From what poses that are tried leave, down to what can be proved."""
-        self._check_middle()
         grid = np.array(list(product((-1.0, 0.0, 1.0), repeat=4)))
         self._bisect(np.concatenate([grid, np.random.default_rng(_SEED).uniform(-1, 1, (_TRIED, 4))]))
-        steps = list(_SHARES)
-        while steps and self.too_large > _LEAST:
-            size = min(steps.pop(0) * self.too_large, LARGEST)
-            told = Within(self.demand, *self.ranges(size)).proved(self.most, self.report)
+        shares = list(_SHARES)
+        while shares and self.too_large > _LEAST:
+            factor = min(shares.pop(0) * self.too_large, 1.0)
+            told = Within(self.demand, *self.whole.times(factor).ranges).proved(self.most, self.report)
             self.pairs += told.pairs
             if told.proved:
-                self.size = size
+                self.factor = factor
                 return told
             if told.against:
-                self._excluded(np.concatenate(told.against)[None])
-                steps = list(_SHARES)
-        return Told(True, 0, self.demand.at(*self._split(self.middle[None]))[0][0])
+                self._excluded(*(pose[None] for pose in told.against))
+                shares = list(_SHARES)
+        u2, _ = self.demand.at(*self.whole.times(0.0).at(np.zeros((1, 4))))
+        return Told(True, 0, u2[0])
 
-    def ranges(self, size: float) -> tuple[Ranges, Ranges]:
-        """Polar angles and azimuths of sensor and light of a box, degrees."""
-        return self._range(0, size), self._range(1, size)
-
-    def limiting(self) -> Limiting | None:
-        """The pose that is known to be too far off, and why."""
-        if self.against is None:
-            return None
-        sensor, light = (Pose(*map(float, self.against[part])) for part in (slice(0, 2), slice(2, 4)))
-        return Limiting(sensor, light, _why(Picture.of(self.picture.scene, sensor, light), self.demand))
-
-    def _range(self, role: int, size: float) -> Ranges:
-        polar, azimuth = self.middle[2 * role : 2 * role + 2]
-        off = size * self.shape[role]
-        low, high = max(polar - off, 0.0), min(polar + off, 180.0)
-        around = 180.0 if low == 0 or high == 180 else min(off / np.sin(np.radians(polar)), 180.0)
-        return (low, high), (azimuth - around, azimuth + around)
-
-    def _size(self, pose: np.ndarray) -> float:
-        """The size of the least box that holds a pose (4,)."""
-        found = []
-        for role, off in enumerate(self.shape):
-            polar, azimuth = self.middle[2 * role : 2 * role + 2]
-            along, around = np.abs(pose[2 * role : 2 * role + 2] - [polar, azimuth])
-            pole = min(polar, 180 - polar)
-            found.append(max(along, min(around * np.sin(np.radians(polar)), pole)) / off)
-        return float(max(found))
-
-    def _at(self, offsets: np.ndarray, size: float) -> np.ndarray:
-        """Poses (n, 4) of a box at offsets (n, 4) from -1 to 1."""
-        ends = np.array(self.ranges(size)).reshape(4, 2)
-        return ends[:, 0] + (offsets + 1) / 2 * (ends[:, 1] - ends[:, 0])
-
-    def _split(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return poses[:, :2], poses[:, 2:]
-
-    def _excluded(self, poses: np.ndarray) -> bool:
-        """Whether one of poses (n, 4) does not keep the demand; boxes that hold it are then known to be too large."""
-        wrong = poses[~self.demand.is_met(*self._split(poses))]
+    def _excluded(self, sensors: np.ndarray, lights: np.ndarray) -> bool:
+        """Whether one of poses (n, 2), (n, 2) does not keep the demand; boxes that hold it are then too large."""
+        wrong = np.flatnonzero(~self.demand.is_met(sensors, lights))
         if not len(wrong):
             return False
-        sizes = [self._size(pose) for pose in wrong]
-        least = int(np.argmin(sizes))
-        if sizes[least] < self.too_large:
-            self.too_large, self.against = sizes[least], wrong[least]
+        factors = self.whole.factors(sensors[wrong], lights[wrong])
+        least = int(np.argmin(factors))
+        if factors[least] < self.too_large:
+            self.too_large, self.against = float(factors[least]), (sensors[wrong[least]], lights[wrong[least]])
         return True
 
     def _bisect(self, offsets: np.ndarray) -> None:
+        """Between the largest box of which poses at all offsets keep the demand and one of which they do not."""
         low = 0.0
         for step in range(_STEPS):
-            size = LARGEST if step == 0 else (low + self.too_large) / 2
-            if not self._excluded(self._at(offsets, size)):
-                low = size
-            if low >= min(self.too_large * (1 - 1e-3), LARGEST):
+            factor = 1.0 if step == 0 else (low + self.too_large) / 2
+            if not self._excluded(*self.whole.times(factor).at(offsets)):
+                low = factor
+            if low >= min(self.too_large * (1 - 1e-3), 1.0):
                 return
-
-    def _check_middle(self) -> None:
-        if not self.demand.is_met(*self._split(self.middle[None]))[0]:
-            raise InvalidInput(
-                f"poses must keep what is asked before any error for a box, got {_why(self.picture, self.demand)}"
-            )
 
 
 def _why(picture: Picture, demand: Demand) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from planner.certifying.cells import Boxes, LightCells, SensorCells
 from planner.certifying.demand import Demand
 from planner.certifying.light_terms import LightTerms
+from planner.certifying.pose_box import Ranges
 from planner.certifying.search import LIGHTS, SENSORS, parted
 from planner.certifying.sensor_terms import SensorTerms
 from planner.certifying.upper import upper_bounds
@@ -16,7 +17,7 @@ from planner.search.objective import Aim
 
 _CHUNK = 4096  # pairs of cells at a time
 _TRIED = 64  # middles of pairs of cells that are evaluated at a time
-Ranges = tuple[tuple[float, float], tuple[float, float]]  # of polar angles and azimuths, degrees
+Pair = tuple[np.ndarray, np.ndarray]  # of a sensor's pose (2,) and a light's, degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class Told:
     proved: bool
     pairs: int
     most: np.ndarray
-    against: tuple[np.ndarray, np.ndarray] | None = None
+    against: Pair | None = None
 
 
 class Within:
@@ -48,8 +49,8 @@ class Within:
     demand : Demand
     sensors : SensorCells
     lights : LightCells
-    inputs : ndarray, shape (n, M)
-        Variances by inputs in the sensors' cells.
+    inputs : ndarray, shape (n, 2, M)
+        Upper bounds of variances by inputs in the sensors' cells, and how far they are above those in the middle.
     """
 
     def __init__(self, demand: Demand, sensor: Ranges, light: Ranges) -> None:
@@ -57,7 +58,7 @@ class Within:
         self.demand = demand
         self.sensors = SensorCells(terms, Boxes.over(*sensor, SENSORS))
         self.lights = LightCells(LightTerms(demand.scene, terms.names), Boxes.over(*light, LIGHTS))
-        self.inputs = np.zeros((0, len(demand.limits)))
+        self.inputs = np.zeros((0, 2, len(demand.limits)))
 
     def proved(self, most: int, report) -> Told:
         """Until every pair of cells keeps the demand, one of their poses does not, or ``most`` pairs were bounded."""
@@ -82,13 +83,16 @@ class Within:
         new = np.arange(len(self.inputs), len(self.sensors.lost))
         if len(new):
             boxes = self.sensors.boxes.some(new)
-            self.inputs = np.concatenate([self.inputs, self.demand.inputs.of(boxes.polar, boxes.azimuth)])
+            found = np.stack(self.demand.inputs.of(boxes.polar, boxes.azimuth), 1)
+            self.inputs = np.concatenate([self.inputs, found])
         told = [upper_bounds(self.sensors, self.lights, pairs[at : at + _CHUNK])
                 for at in range(0, len(pairs), _CHUNK)]  # fmt: skip
         noise, parts = (np.concatenate([each[k] for each in told]) for k in (0, 1))
-        return self.demand.u2(noise, self.inputs[pairs[:, 0]]), parts
+        most, off = np.moveaxis(self.inputs[pairs[:, 0]], 1, 0)
+        parts[:, 0] += off.sum(-1)
+        return self.demand.u2(noise, most), parts
 
-    def _against(self, pairs: np.ndarray, u2: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    def _against(self, pairs: np.ndarray, u2: np.ndarray) -> Pair | None:
         """The middle of one of the pairs that looks worst, if that does not keep the demand."""
         if not len(pairs):
             return None
