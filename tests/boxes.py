@@ -43,8 +43,14 @@ def drawn_part(folder: Path, seed: int, tolerance: float) -> Scene:
         {"vertex": solid.vertex_names[one], "edges": [e.name for e in solid.meeting[one] if set(e.ends) <= top]}
         for one in map(int, draws.choice(sorted(top), 2, replace=False))
     ]
-    part = {"kind": "mesh", "file": str(path), "units": "cm", "names": {}}
-    return scenes.load("wedge").with_(object=part, task=None, measurands=[_asked(features, tolerance)])
+    return Scene.model_validate({
+        "name": f"drawn{seed}", "object": {"kind": "mesh", "units": "cm", "file": str(path)},
+        "material": {"diffuse_reflectance": 0.9},
+        "camera": {"width": 256, "height": 240, "focal_px": 800.0, "distance": 100.0, "blur_px": 0.6,
+                   "exposure": 200.0},
+        "light": {"distance": 100.0}, "noise": {"dark_level": 20.0, "sigma": 2.4, "bits": 8},
+        "measurands": [_asked(features, tolerance)],
+    })  # fmt: skip
 
 
 def _asked(features: list[dict], tolerance: float) -> dict:
