@@ -128,10 +128,12 @@ class SensorCells:
             boxes, seen = self.boxes.quarters(new), np.repeat(self.seen[new], 4, axis=0)
             kept = self._is_possible(boxes, seen)
             parent, boxes, seen = np.repeat(new, 4)[kept], boxes.some(kept), seen[kept]
-            sides, table, lost = self._told(boxes, seen)
             first = len(self.lost)
             for each in new:
                 self._parts[int(each)] = first + np.flatnonzero(parent == each)
+            if not kept.any():  # no pose of theirs sees these faces
+                return self._parts
+            sides, table, lost = self._told(boxes, seen)
             self.boxes = _joined(self.boxes, boxes)
             self.seen, self.sides = np.concatenate([self.seen, seen]), np.concatenate([self.sides, sides])
             self.table, self.lost = Table.joined([self.table, table]), np.concatenate([self.lost, lost])

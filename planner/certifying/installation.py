@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -93,9 +94,10 @@ class InstallationBox:
     @property
     def told(self) -> str:
         """In one sentence, without its end."""
+        sensor, light = _down(self.sensor_deg), _down(self.light_deg)
         return (
-            f"U is at most half the tolerance over {self.k:g} wherever the sensor stands within {self.sensor_deg:.3g} "
-            f"and the light within {self.light_deg:.3g} degrees of these poses"
+            f"U is at most half the tolerance over {self.k:g} wherever the sensor stands within {sensor:g} degrees of "
+            f"its pose and the light within {light:g} of its own"
         )
 
 
@@ -138,8 +140,8 @@ def installation_box(
     --------
     >>> import scenes
     >>> box = installation_box(scenes.load("calibrated_rig"), (10, 60), (10, 25), k=6)
-    >>> round(box.sensor_deg, 1), round(box.share, 2), box.limited_by.why
-    (0, 0, '')
+    >>> round(box.sensor_deg, 1), round(box.light_deg, 1), round(box.share, 2)
+    (4.6, 4.6, 0.99)
     """
     picture, k = Picture.of(scene, sensor, light), number(k, "k")
     if not k > 0:
@@ -254,4 +256,16 @@ def _why(picture: Picture, demand: Demand) -> str:
     found = budget(picture, variances=noise, biased=False)
     U, limit, worst = max(((each.U, limit, each) for each, limit in zip(found, demand.limits, strict=True)),
                           key=lambda one: one[0] / one[1])  # fmt: skip
-    return f"U of {worst.name} {U:.3g} {worst.unit}, above {limit:.3g}"
+    return f"U of {worst.name} {U:.3g} {worst.unit}, {100 * (U / limit - 1):.2g} % above what is asked"
+
+
+def _down(angle: float) -> float:
+    """With three digits, and no larger: what is printed is proved, too.
+
+    >>> _down(4.6299), _down(0.0)
+    (4.62, 0.0)
+    """
+    if angle == 0:
+        return 0.0
+    digits = 2 - math.floor(math.log10(angle))
+    return math.floor(angle * 10**digits) / 10**digits
