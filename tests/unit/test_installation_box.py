@@ -63,7 +63,7 @@ def test_no_drawn_pose_is_above_the_bound_of_its_cell(name, half):
         assert bound[known] == pytest.approx(most[known], rel=2e-6)
         assert (known == np.isfinite(most)).mean() > 0.7  # few that can measure are not known to
     else:
-        assert np.median((most / bound)[known]) > 0.95
+        assert np.median(most[known] / bound[known]) > 0.95
     assert (most > 0.98 * bound)[known].sum() > 5  # one that is 2 % too low is caught
 
 
@@ -131,7 +131,7 @@ def test_a_box(scene, poses, k, count):
 def test_a_drawn_part_and_whole_budgets(tmp_path):
     """Whole budgets in the corners of a drawn part's box, at the variance meant and of the estimator that measures."""
     scene = drawn_part(tmp_path, 3, 0.03)
-    box = planner.installation_box(scene, (35, 20), (15, 250), k=4.6)
+    box = planner.installation_box(scene, (35, 20), (15, 250), k=5.3)
     assert box.sensor_deg > 0
     signs = np.sign(np.random.default_rng(4).uniform(-1, 1, (8, 4)))
     for sensor, light in zip(*box.poses.at(signs), strict=True):
