@@ -51,7 +51,7 @@ def cases(folder: Path, drawn: int) -> list[tuple[str, Scene, tuple, float]]:
 
 def boxes(
     poses: Annotated[int, typer.Option(help="Drawn in each box.")] = 10_000,
-    drawn: Annotated[int, typer.Option(help="Convex parts, beside three bundled scenes.")] = 5,
+    drawn: Annotated[int, typer.Option(help="Convex parts, beside three bundled scenes.")] = 3,
     seed: int = 1,
 ) -> None:
     """Draw poses in installation boxes and beside them."""
