@@ -35,12 +35,14 @@ if TYPE_CHECKING:
     from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
     from planner.certifying.certificate import Certificate, certified
+    from planner.certifying.installation import InstallationBox, installation_box
 
 _LATER = {
     "BoardPlan": "board_places", "place_board": "board_places",
     "BundleBudget": "budgeting.bundles", "SceneBudget": "budgeting.budgets", "budget": "budgeting.budgets",
     "bundle_budget": "budgeting.bundles", "CapabilityPlan": "budgeting.plans", "plan_capability": "budgeting.plans",
     "Certificate": "certifying.certificate", "certified": "certifying.certificate",
+    "InstallationBox": "certifying.installation", "installation_box": "certifying.installation",
 }  # fmt: skip
 
 
@@ -70,6 +72,7 @@ __all__ = [
     "Coverage",
     "EdgePrediction",
     "Forecast",
+    "InstallationBox",
     "Map",
     "NothingMeasuresAll",
     "Pictures",
@@ -90,6 +93,7 @@ __all__ = [
     "coverage",
     "exhaustive",
     "image",
+    "installation_box",
     "place_board",
     "plan",
     "plan_capability",

@@ -110,7 +110,7 @@ class SensorCells:
     sides : ndarray of int, shape (n, E)
         Which of `SIDES` each edge shows.
     table : Table
-        (n, M, E, k).
+        (n, M, E, k); ``sure`` (n,).
     lost : ndarray of bool, shape (n,)
     """
 
@@ -128,10 +128,12 @@ class SensorCells:
             boxes, seen = self.boxes.quarters(new), np.repeat(self.seen[new], 4, axis=0)
             kept = self._is_possible(boxes, seen)
             parent, boxes, seen = np.repeat(new, 4)[kept], boxes.some(kept), seen[kept]
-            sides, table, lost = self._told(boxes, seen)
             first = len(self.lost)
             for each in new:
                 self._parts[int(each)] = first + np.flatnonzero(parent == each)
+            if not kept.any():  # no pose of theirs sees these faces
+                return self._parts
+            sides, table, lost = self._told(boxes, seen)
             self.boxes = _joined(self.boxes, boxes)
             self.seen, self.sides = np.concatenate([self.seen, seen]), np.concatenate([self.sides, sides])
             self.table, self.lost = Table.joined([self.table, table]), np.concatenate([self.lost, lost])
@@ -170,7 +172,8 @@ class SensorCells:
                 some = here[at : at + _AT_ONCE]
                 with np.errstate(all="ignore"):  # what is not bounded
                     made = terms.of(boxes.polar[some], boxes.azimuth[some], way)
-                    found.append(Table.of(made.factors, long=made.long, brief=made.brief, norms=made.norms))
+                    found.append(Table.of(made.factors, long=made.long, brief=made.brief, norms=made.norms,
+                                          spare=made.spare, sure=made.sure))  # fmt: skip
                 lost[some] = made.lost
                 order.append(some)
         return np.maximum(sides, 0), Table.joined(found).some(np.argsort(np.concatenate(order))), lost
@@ -218,25 +221,41 @@ def _joined(one: Boxes, other: Boxes) -> Boxes:
 def bounds(sensors: SensorCells, lights: LightCells, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lower bound of what is minimised for pairs of cells (p, 2), and what of its distance from the value in the
     middle the sensors' cell and the lights' make, (p, 2)."""
-    i, j = pairs.T
-    s, at = sensors.table.some(i), (np.arange(len(pairs))[:, None], np.arange(sensors.sides.shape[1]), sensors.sides[i])
-    k = lights.table.some(j)
-    middle, low, high = (getattr(k, name)[at][:, None] for name in ("middle", "low", "high"))
-    tilt, slack = (np.moveaxis(getattr(k, name), 1, 0)[(slice(None), *at)][:, :, None] for name in ("tilt", "slack"))
-    natural = _edge_by_edge(s, low, high, k.uneven[:, None]).sum(-1)
-    with np.errstate(all="ignore"):
-        at_middle, size = _sum(s.middle * middle), np.abs(s.middle)
-        wide, centre, most = (high - low) / 2, (high + low) / 2, np.maximum(np.abs(low), np.abs(high))
-        by_sensor = sum(
-            np.abs(_sum(s.tilt[:, a] * centre)) + _sum(np.abs(s.tilt[:, a]) * wide + s.slack[:, a] * most)
-            for a in (0, 1)
-        )
-        by_light = sum(np.abs(_sum(s.middle * tilt[a])) + _sum(size * slack[a]) for a in (0, 1))
-        leant = at_middle - by_sensor - by_light
+    s, k = paired(sensors, lights, pairs)
+    natural = _edge_by_edge(s, k.low, k.high, k.uneven).sum(-1)
+    at_middle, by_sensor, by_light = leaning(s, k)
+    leant = at_middle - by_sensor - by_light
     bound = np.fmax(np.fmax(natural, np.where(leant < HUGE, leant, 0.0)), 0.0) * (1 - ROUNDING)
     parts = np.stack([np.nan_to_num(part, nan=HUGE, posinf=HUGE).sum(-1) for part in (by_sensor, by_light)], -1)
     joined = sensors.terms.aim.joined(np.moveaxis(bound, -1, 0))
-    return np.where(sensors.lost[i], HUGE, joined), parts
+    return np.where(sensors.lost[pairs[:, 0]], HUGE, joined), parts
+
+
+def paired(sensors: SensorCells, lights: LightCells, pairs: np.ndarray) -> tuple[Table, Table]:
+    """Tables of pairs of cells (p, 2): the sensors', (p, M, E, k), and of the lights' what each edge shows of them,
+    (p, 1, E, k)."""
+    i, j = pairs.T
+    k = lights.table.some(j).parts
+    at = (np.arange(len(pairs))[:, None], np.arange(sensors.sides.shape[1]), sensors.sides[i])
+    shown = {name: k[name][at][:, None] for name in ("middle", "low", "high")}
+    leans = {name: np.moveaxis(np.moveaxis(k[name], 1, 0)[(slice(None), *at)], 0, 1)[:, :, None]
+             for name in ("tilt", "slack")}  # fmt: skip
+    return sensors.table.some(i), Table(shown | leans | {"uneven": k["uneven"][:, None]})
+
+
+def leaning(s: Table, k: Table, last: int | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The sum over edges and their terms, the last of which may be left out, in the middle of pairs of cells, and how
+    far from it the sensor's cell and the light's may make it, (p, M) each."""
+    low, high, middle = (part[..., :last] for part in (k.low, k.high, s.middle))
+    with np.errstate(all="ignore"):
+        wide, centre, most = (high - low) / 2, (high + low) / 2, np.maximum(np.abs(low), np.abs(high))
+        by_sensor, by_light = 0.0, 0.0
+        for a in (0, 1):
+            tilt, slack = s.tilt[:, a, ..., :last], s.slack[:, a, ..., :last]
+            by_sensor = by_sensor + np.abs(_sum(tilt * centre)) + _sum(np.abs(tilt) * wide + slack * most)
+            tilt, slack = k.tilt[:, a, ..., :last], k.slack[:, a, ..., :last]
+            by_light = by_light + np.abs(_sum(middle * tilt)) + _sum(np.abs(middle) * slack)
+        return _sum(middle * k.middle[..., :last]), by_sensor, by_light
 
 
 def _edge_by_edge(s: Table, low: np.ndarray, high: np.ndarray, uneven: np.ndarray) -> np.ndarray:

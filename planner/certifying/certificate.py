@@ -138,14 +138,15 @@ def check_certifiable(found: Plan, limits: Constraints) -> None:
         )
     if limits.same_mount:
         raise InvalidInput("same_mount must be left out for a certificate, got both")
-    if not _has_terms(scene):
+    if not has_terms(scene):
         raise InvalidInput(
             "scene must be of one matt convex part, distances of corners, one free point of light and a perspective "
             f"lens without distortion for a certificate, got {scene.name}"
         )
 
 
-def _has_terms(scene: Scene) -> bool:
+def has_terms(scene: Scene) -> bool:
+    """Whether bounds are known of a scene."""
     camera, noise = scene.camera, scene.noise
     lens = not camera.lens.bends and camera.blur_field is None and camera.perspective == 1
     plain = noise.colour is None and not noise.is_shared

@@ -53,7 +53,7 @@ class LightTerms:
         for name in self.names:
             squares = self._squares(axis, name)
             sides = [self._strength(axis, face) for face in self.scene.solid.edge(name).faces]
-            least = np.minimum.reduce([self._least(axis, name), *(part.low for part in squares)])
+            least = np.maximum(self._least(axis, name), np.minimum.reduce([part.low for part in squares]))
             most = np.maximum(*(side.high for side in sides))
             hot |= most > headroom(self.scene.noise) * np.maximum(least, 0.0) ** 1.5
             steps = [np.maximum(np.abs((b - a).low), np.abs((b - a).high)) for a, b in pairwise(squares)]

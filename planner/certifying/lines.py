@@ -19,77 +19,15 @@ from imaging.features.locator import MIN_USABLE, PIXEL_VARIANCE, reach
 from imaging.geometry.visibility import boundaries
 from imaging.models.along import NODE_WEIGHTS, NODES
 from imaging.models.calibrated import SHORT
-from planner.certifying.enclosed import HUGE, Enclosed, either, variables
-from planner.certifying.series import bernstein, direction, dot, frame, with_last, within
+from planner.certifying.enclosed import HUGE, Enclosed, either
+from planner.certifying.series import bernstein, dot, with_last, within
+from planner.certifying.view import View
 from scenes import Edge, Scene
 
 _PLACES = np.concatenate([[-1.0], NODES, [1.0]])  # of nodes, in half used lengths from the middle
 _INSIDE = np.concatenate([[0.0], NODE_WEIGHTS, [0.0]])
 UNEVEN = 2.5  # how much r^6 may change along an edge for its middle and its ends to be weighed at a glance
 _ENDS = np.array([1.0] + [0.0] * len(NODE_WEIGHTS) + [1.0])
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """From where n cells of sensors look.
-
-    Attributes
-    ----------
-    scene : Scene
-    axis, right, down : list of Enclosed
-        Unit vectors towards the sensor and along the image's axes, by their components, shape (n,) each.
-    seen : ndarray of bool, shape (F,)
-        Which of the solid's faces all see.
-    """
-
-    scene: Scene
-    axis: list[Enclosed]
-    right: list[Enclosed]
-    down: list[Enclosed]
-    seen: np.ndarray
-
-    @classmethod
-    def of(cls, scene: Scene, polar: np.ndarray, azimuth: np.ndarray, seen: np.ndarray) -> View:
-        """From cells (n, 2), (n, 2), rad."""
-        angles = variables(polar, azimuth)
-        return cls(scene, direction(*angles), *frame(*angles, np.radians(scene.camera.roll_deg)), seen)
-
-    def of_boxes(self, some: np.ndarray) -> View:
-        """Of some of the cells alone."""
-        axes = ([part.of_boxes(some) for part in axis] for axis in (self.axis, self.right, self.down))
-        return View(self.scene, *axes, self.seen)
-
-    def along(self, vector: np.ndarray) -> Enclosed:
-        """Of a vector (3,) the part along the axis, its unit."""
-        return dot(self.axis, vector)
-
-    def from_eye(self, place: np.ndarray, vector: np.ndarray) -> Enclosed:
-        """w . vector of a place (3,)."""
-        camera = self.scene.camera
-        rest = camera.perspective * float((np.array(camera.look_at) - place) @ vector)
-        return self.along(camera.distance * vector) + rest
-
-    def divisor(self, place: np.ndarray) -> Enclosed:
-        """D of a place (3,), scene units."""
-        camera = self.scene.camera
-        return self.along(-camera.perspective * (place - np.array(camera.look_at))) + camera.distance
-
-    def image(self, place: np.ndarray) -> tuple[Enclosed, Enclosed]:
-        """Where a place (3,) is seen, px from the image's middle to the right and down."""
-        away, scale = place - np.array(self.scene.camera.look_at), self.divisor(place).inverse()
-        x, y = (dot(axis, away * self.scene.camera.focal_px) * scale for axis in (self.right, self.down))
-        return x, y
-
-    def over(self, corner: np.ndarray, one: np.ndarray, other: np.ndarray, edges: tuple[Edge, Edge]) -> Enclosed:
-        """w . (one x other) of a corner and directions of edges that meet there, of the sign that a face tells that
-        has both."""
-        normal = np.cross(one, other)
-        found, shared = self.from_eye(corner, normal), set(edges[0].faces) & set(edges[1].faces)
-        if not shared:
-            return found
-        face = min(shared)
-        up = 1.0 if (normal @ self.scene.solid.normals[face] > 0) == self.seen[face] else -1.0
-        return (found * up).at_least(0.0) * up
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +44,8 @@ class Line:
         At both ends.
     clear : float
         What is left out at an end at least, px.
-    is_short : ndarray of bool, shape (n,)
-        Whether no more than that can be.
+    is_short, is_long : ndarray of bool, shape (n,)
+        Whether no more than that can be, and whether less cannot.
     wanted : pair of float
         The least and the greatest length, px, that is used by the poses that count.
     """
@@ -119,6 +57,7 @@ class Line:
     divisors: tuple[Enclosed, Enclosed]
     clear: float
     is_short: np.ndarray
+    is_long: np.ndarray
     wanted: tuple[float, float] = (MIN_USABLE, HUGE)
 
     @classmethod
@@ -127,12 +66,12 @@ class Line:
         ends = solid.vertices[list(edge.ends)]
         divisors = tuple(map(view.divisor, ends))
         size = camera.focal_px * float(np.linalg.norm(ends[1] - ends[0]))
-        height, over = _height(view, *ends), divisors[0] * divisors[1]
+        height, over = view.height(*ends), divisors[0] * divisors[1]
         clear = reach(view.scene.locator.scale_px, camera.most_blur_px)
         least = MIN_USABLE + 2 * clear  # px, of an edge of which anything is left
         length = height * size / over
         made = height.kept(least / size * over.low), length.kept(least)
-        return cls(view, edge, *made, divisors, clear, length.high < least, wanted)
+        return cls(view, edge, *made, divisors, clear, length.high < least, length.low >= least, wanted)
 
     @cached_property
     def _trims(self) -> tuple[Enclosed, Enclosed]:
@@ -174,9 +113,9 @@ class Line:
         ways = [(place - corner) / np.linalg.norm(place - corner) for place in (far, next_)]
         near, there, aside = (self.view.divisor(place) for place in (corner, far, next_))
         over = self.view.over(corner, *ways, (self.edge, other)).absolute()
-        size = _height(self.view, corner, next_) * float(camera.focal_px * np.linalg.norm(next_ - corner))
+        size = self.view.height(corner, next_) * float(camera.focal_px * np.linalg.norm(next_ - corner))
         size = size / (near * aside)
-        beside = _height(self.view, corner, next_) * there * (clear / camera.focal_px / np.linalg.norm(far - corner))
+        beside = self.view.height(corner, next_) * there * (clear / camera.focal_px / np.linalg.norm(far - corner))
         beside = beside / over
         apart = over * float(camera.focal_px * np.linalg.norm(next_ - corner)) / (self.height * aside)
         ahead = self._ahead(corner, far, next_)
@@ -215,6 +154,12 @@ class Line:
         left = -(self._trims[0] + self._trims[1]) + 1.0
         return self.is_short | ((left * self.length).high < MIN_USABLE)
 
+    @property
+    def sure(self) -> np.ndarray:
+        """Where enough is left from all of a cell, bool (n,)."""
+        left = -(self._trims[0] + self._trims[1]) + 1.0
+        return self.is_long & (left.low * self.length.low >= MIN_USABLE)
+
     @cached_property
     def used(self) -> Enclosed:
         """Length that is used, px."""
@@ -238,16 +183,18 @@ class Line:
         """Bernstein's polynomials at the nodes, (n, j, DEGREE + 1)."""
         return bernstein(self.spatial)
 
-    def factors(self, start: Enclosed, stop: Enclosed) -> tuple[Enclosed, np.ndarray]:
-        """As of `Terms`, (n, DEGREE + 3), and its norms (n, 2), from derivatives over h by the displacement of both
-        ends; of a part that is wanted longer than `SHORT` scales, or shorter."""
+    def factors(self, start: Enclosed, stop: Enclosed) -> tuple[Enclosed, np.ndarray, np.ndarray]:
+        """As of `Terms`, (n, DEGREE + 3), its norms and what it spares, (n, 2) each, from derivatives over h by the
+        displacement of both ends; of a part that is wanted longer than `SHORT` scales, or shorter."""
         scale = self.view.scene.locator.scale_px
         skew = self.trims[1] - self.trims[0]
         lever = (stop * (skew + 1.0) - start * (-skew + 1.0)) * 0.5  # times the share that is used
         weight = (start + stop).wide() + (lever / self.share).wide() * (6 * _PLACES)
         if self.wanted[0] >= SHORT * scale:
-            return self._long(weight, lever / self.share, scale), self._least(start + stop, lever, scale)
-        return self._short(weight, scale), self._norms(start + stop, lever, scale)
+            found, spare = self._long(weight, lever / self.share, scale)
+            return found, self._least(start + stop, lever, scale), spare
+        found, spare = self._short(weight, scale)
+        return found, self._norms(start + stop, lever, scale), spare
 
     def _least(self, offset: Enclosed, lever: Enclosed, scale: float) -> np.ndarray:
         """Of a long part, as of A d + B theta by points of equal noise, the least of what r^6 is multiplied with, where
@@ -276,7 +223,7 @@ class Line:
         wide = height.high * np.sqrt(most * flat) * (sizes[0] * self.share.high + 6 * sizes[1])
         return np.stack([norm, wide * bent / 2], -1)
 
-    def _long(self, weight: Enclosed, lever: Enclosed, scale: float) -> Enclosed:
+    def _long(self, weight: Enclosed, lever: Enclosed, scale: float) -> tuple[Enclosed, np.ndarray]:
         size, ends = self.view.scene.camera.focal_px, self.view.scene.solid.vertices[list(self.edge.ends)]
         size *= float(np.linalg.norm(ends[1] - ends[0]))
         over = self.divisors[0] * self.divisors[1] / (self.share * size)  # h / used
@@ -284,10 +231,12 @@ class Line:
         less = over.square().wide() * (-2 * scale**2 * _ENDS)
         tilt = (lever / self.used).square() * over.square()
         factor = weight.square() * (share + less) + tilt.wide() * (192 * scale**4 * _INSIDE)
-        values = (factor * self.kappa2).wide() * self.basis
-        return with_last(with_last(values.sum(-2), None), (weight.square() * less * self.kappa2).sum())
+        each = factor * self.kappa2
+        values = each.wide() * self.basis
+        spare = np.stack([np.zeros(len(each.high)), np.maximum(each.high, 0.0).sum(-1)], -1)
+        return with_last(with_last(values.sum(-2), None), (weight.square() * less * self.kappa2).sum()), spare
 
-    def _short(self, weight: Enclosed, scale: float) -> Enclosed:
+    def _short(self, weight: Enclosed, scale: float) -> tuple[Enclosed, np.ndarray]:
         """The double integral by r^3 r'^3 = (r^6 + r'^6) / 2 - (r^3 - r'^3)^2 / 2."""
         kappa = self.kappa2.sqrt() if isinstance(self.kappa2, Enclosed) else np.sqrt(self.kappa2)
         part = weight[..., 1:-1] * (NODE_WEIGHTS / 2) * self.height.wide()
@@ -298,21 +247,8 @@ class Line:
         basis = self.basis[..., 1:-1, :]
         crowd = pairs.sum()
         values = with_last((crowd.wide() * basis).sum(-2), pairs.absolute().sum().sum() * -0.5)
-        return with_last(values, -((-crowd).at_least(0.0).sum()))
-
-
-def _height(view: View, start: np.ndarray, stop: np.ndarray) -> Enclosed:
-    """h of the line from one place to another, scene units."""
-    camera = view.scene.camera
-    way, away, share = (
-        (stop - start) / np.linalg.norm(stop - start),
-        start - np.array(camera.look_at),
-        camera.perspective,
-    )
-    level, turned = view.along(way), np.cross(way, away)
-    lean = view.along(2 * camera.distance * share * away) - level * (2 * camera.distance * share * float(way @ away))
-    found = -(level.square()) * camera.distance**2 - lean - view.along(share * turned).square()
-    return (found + camera.distance**2 + share**2 * float(turned @ turned)).sqrt()
+        spare = [np.maximum(-pairs.low, 0.0).sum((-1, -2)) / 2, np.maximum(crowd.high, 0.0).sum(-1)]
+        return with_last(values, -((-crowd).at_least(0.0).sum())), np.stack(spare, -1)
 
 
 def _kappa2(scene: Scene, divisors: tuple[Enclosed, Enclosed], spatial: Enclosed) -> Enclosed | float:

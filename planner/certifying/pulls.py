@@ -19,7 +19,7 @@ from scenes.measurands.kinds import MEASURANDS
 
 if TYPE_CHECKING:
     from planner.certifying.lines import Line as Image
-    from planner.certifying.lines import View
+    from planner.certifying.view import View
 
 _NONE = 1e-12  # of the largest: a place that moves nothing
 
@@ -75,6 +75,21 @@ class Pull:
         off = view.from_eye(self.middle, square @ other)
         facing = [view.from_eye(self.middle, row) * view.from_eye(self.place, row) for row in _axes(unit)]
         return view.from_eye(self.place, self.slope) * off / (facing[0] + facing[1])
+
+    def back(self, view: View) -> list[Enclosed]:
+        """Derivative of the quantity by where the place seems to be in space, whose image is taken back to the plane:
+        slope - N (slope.w) / (N.w)."""
+        lean = view.from_eye(self.place, self.slope)
+        if self.across is not None:
+            lean = lean / view.from_eye(self.place, self.across)
+            return [lean * -float(n) + float(s) for n, s in zip(self.across, self.slope, strict=True)]
+        unit = self.slope / np.linalg.norm(self.slope)
+        rows = _axes(unit)
+        facing = [view.from_eye(self.middle, row) for row in rows]
+        over = [part * view.from_eye(self.place, row) for part, row in zip(facing, rows, strict=True)]
+        lean = lean / (over[0] + over[1])
+        normal = [facing[0] * float(a) + facing[1] * float(b) for a, b in rows.T]
+        return [-(lean * n) + float(s) for n, s in zip(normal, self.slope, strict=True)]
 
     def shares(self, line: Image) -> tuple[float, float]:
         """Of a displacement beside the place the derivatives by those of the edge's ends."""

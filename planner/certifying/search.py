@@ -149,11 +149,11 @@ class Search:
         wild = parts[:, 0] >= 1e30  # slopes of the sensor's terms are not bounded
         by_sensor = np.where(wild, size[0] > _FINE * size[1], parts[:, 0] >= parts[:, 1])
         return np.concatenate([
-            _parted(self.sensors, pairs[by_sensor], 0), _parted(self.lights, pairs[~by_sensor], 1),
+            parted(self.sensors, pairs[by_sensor], 0), parted(self.lights, pairs[~by_sensor], 1),
         ])  # fmt: skip
 
 
-def _parted(cells: SensorCells | LightCells, pairs: np.ndarray, role: int) -> np.ndarray:
+def parted(cells: SensorCells | LightCells, pairs: np.ndarray, role: int) -> np.ndarray:
     """Each pair as often as its cell has parts, with these instead."""
     different, which = np.unique(pairs[:, role], return_inverse=True)
     known = cells.quarters(different)

@@ -17,9 +17,11 @@ from imaging.features.locator import MIN_USABLE
 from imaging.features.projected_edges import straight
 from imaging.models.calibrated import SHORT
 from planner.certifying.enclosed import HUGE, Enclosed, variables
-from planner.certifying.lines import Line, View
+from planner.certifying.lines import Line
 from planner.certifying.pulls import Pull, pulls_of
 from planner.certifying.series import DEGREE, direction, dot, spread_over, stacked
+from planner.certifying.view import View
+from planner.ranks import MIN_SINE
 from planner.search.objective import Aim
 from scenes import Edge, Scene
 
@@ -41,15 +43,20 @@ class Terms:
         correlation, and the greatest of their sizes times half the share of the edge that is used: a light whose r^3
         changes by a share c along the edge makes no less of it than r^6 (norm - c times the other)^2. Of the former the
         least norm alone, where r^6 changes by no more than `UNEVEN`.
-    lost : ndarray of bool, shape (n,)
-        Whether no pose of the cell can measure all.
+    spare : ndarray, shape (n, M, E, 2)
+        In place of the last two factors, what they add at most to an upper bound.
+    lost, sure : ndarray of bool, shape (n,)
+        Whether no pose of the cell can measure all, and whether each can: all edges are seen, long enough, and meet at
+        enough of an angle.
     """
 
     factors: Enclosed
     long: np.ndarray
     brief: np.ndarray
     norms: np.ndarray
+    spare: np.ndarray
     lost: np.ndarray
+    sure: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,26 +105,40 @@ class SensorTerms:
         whole = np.zeros(len(self.scene.solid.faces), bool)
         whole[self.faces] = seen
         view = View.of(self.scene, polar, azimuth, whole)
-        lost, each = np.zeros(len(polar), bool), []
+        lost, sure, each = np.zeros(len(polar), bool), self._are_apart(view), []
         for name in self.names:
             edge = self.scene.solid.edge(name)
             line = Line.of(view, edge)
             lost |= line.lost | (not whole[list(edge.faces)].any())
+            sure &= line.sure
             each.append(self._of_edge(view, edge, line.used))
         shares = self.aim.shares[:, None, None]
-        factors, *others = ([edge[k] for edge in each] for k in range(4))
+        factors, *others = ([edge[k] for edge in each] for k in range(5))
         parts = [stacked([edge[m] for edge in factors]) * float(share) for m, share in enumerate(self.aim.shares)]
-        long, brief, norms = (np.stack(part, 2) for part in others)
-        return Terms(stacked(parts), long * shares, brief * shares, norms * np.sqrt(shares[..., None]), lost)
+        long, brief, norms, spare = (np.stack(part, 2) for part in others)
+        norms, spare = norms * np.sqrt(shares[..., None]), spare * shares
+        return Terms(stacked(parts), long * shares, brief * shares, norms, spare, lost, sure & ~lost)
+
+    def _are_apart(self, view: View) -> np.ndarray:
+        """Whether both edges of every corner meet at enough of an angle from all of a cell, bool (n,)."""
+        solid, found = self.scene.solid, np.ones(len(view.axis[0].middle), bool)
+        for pull in (pull for pulls in self.pulls for pull in pulls):
+            edges = tuple(map(solid.edge, pull.edges))
+            ends = [solid.vertices[list(edge.ends)] for edge in edges]
+            ways = [(stop - start) / np.linalg.norm(stop - start) for start, stop in ends]
+            over = view.over(pull.place, *ways, edges).absolute()
+            heights = [view.height(*each).high for each in ends]
+            found &= over.low * view.divisor(pull.place).low >= MIN_SINE * np.prod(heights, axis=0)
+        return found
 
     def _of_edge(
         self, view: View, edge: Edge, used: Enclosed
-    ) -> tuple[list[Enclosed], np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[list[Enclosed], np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Factors of each quantity, and the others of `Terms`, (n, M, ...), of an edge of which so much is used, px."""
         border, count, many = SHORT * self.scene.locator.scale_px, len(used.low), len(self.pulls)
         ways = (border, HUGE), (MIN_USABLE, border)
         lows = np.full((2, count, many, DEGREE + 3), HUGE)
-        norms = np.full((2, count, many, 2), [HUGE, 0.0])
+        norms, spare = np.full((2, count, many, 2), [HUGE, 0.0]), np.zeros((count, many, 2))
         factors: list[Enclosed | None] = [None] * many
         for way, (wanted, some) in enumerate(zip(ways, (used.high >= border, used.low < border), strict=True)):
             here = np.flatnonzero(some)
@@ -125,11 +146,12 @@ class SensorTerms:
                 continue
             line = Line.of(view if some.all() else view.of_boxes(here), edge, wanted)
             for m in range(many):
-                made, norm = line.factors(*self._moved(line, m))
+                made, norm, own = line.factors(*self._moved(line, m))
                 lows[way, here, m] = made.low
                 factors[m] = spread_over(made, here, used, factors[m])
                 norms[way, here, m] = norm
-        return factors, *lows, np.moveaxis(norms, 0, -2)
+                spare[here, m] = np.maximum(spare[here, m], own)
+        return factors, *lows, np.moveaxis(norms, 0, -2), spare
 
     def _moved(self, line: Line, m: int) -> tuple[Enclosed, Enclosed]:
         """Derivatives of a quantity by the displacement of an edge's first and last end, over the edge's h."""

@@ -46,7 +46,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "effects": ("small.toml",),
     "calibrate": ("small.toml", "--images", "10"),
     "calibrate-camera": ("0.png", "1.png", "2.png", "--square", "25", "--model", "k1,k2,p1,p2"),
-    "budget": ("calibrated_rig", "--monte-carlo", "--reach", "0.005"),
+    "budget": ("calibrated_rig", "--monte-carlo", "--reach", "0.005", "--box", "7.6"),
     "msa": ("calibrated_rig",),
     "catalogue": ("check", "parts.toml"),
     "design": ("calibrated_rig", "--catalogue", "parts.toml", "--own-light", "--lens-blur", "2"),

@@ -8,6 +8,7 @@ from tests.proofs.affine_fits import affine_fits
 from tests.proofs.arcs import arcs
 from tests.proofs.bias import bias
 from tests.proofs.boards import boards
+from tests.proofs.boxes import boxes
 from tests.proofs.bundles import bundles
 from tests.proofs.colour import colour
 from tests.proofs.conditions import conditions
@@ -50,6 +51,7 @@ app.command()(affine_fits)
 app.command()(arcs)
 app.command()(bias)
 app.command()(boards)
+app.command()(boxes)
 app.command()(bundles)
 app.command()(colour)
 app.command()(conditions)

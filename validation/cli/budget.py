@@ -31,6 +31,7 @@ from validation.report.terminal import console
 from validation.strict_json import dumps
 
 if TYPE_CHECKING:
+    from planner import InstallationBox
     from planner.budgeting.budgets import SceneBudget
     from planner.uncertainty.budget import Budget
 
@@ -62,6 +63,10 @@ class Options:
     reach: Annotated[
         float | None, typer.Option(metavar="U", help="Which input would have to be how well known for this U?")
     ] = None
+    box: Annotated[
+        float | None,
+        typer.Option(metavar="K", help="How far may both poses be off, for U within half the tolerance over K?"),
+    ] = None
     csv_file: Annotated[Path | None, typer.Option("--csv", metavar="FILE.csv", help="Write all contributions.")] = None
     out: Annotated[
         Path | None,
@@ -81,16 +86,17 @@ def budget_command(given: Options) -> None:
     poses = None if given.sensor is None else parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
     loaded = scenes.load(given.scene)
     from imaging.light.appearance import is_plain
-    from validation import budgets
+    from validation import boxes, budgets
 
     picture = first_picture(loaded, *poses)
     if given.stations and not is_plain(loaded):
         raise scenes.InvalidInput(f"--stations must be 0 but for one convex body before darkness, got {given.stations}")
+    box = None if given.box is None else _box(picture, given)
     with progress("simulating the picture for its bias", "renders", at_once=True):
         found = budgets.budget_of(picture, given.p, rendered=given.render)
     drawn = budgets.monte_carlo(found, given.seed) if given.monte_carlo else []
     shown = budgets.pictured(found, given.stations, given.seed) if given.stations else None
-    facts = budgets.facts(found, drawn, shown, given.reach)
+    facts = budgets.facts(found, drawn, shown, given.reach) | {"box": box and boxes.facts(box)}
     if given.out:
         _write(found, facts, given.out)
     if given.csv_file:
@@ -99,8 +105,17 @@ def budget_command(given: Options) -> None:
         say(facts, True, "")
         return
     _show(found, drawn, shown, given.reach)
+    for line in boxes.said(box) if box else ():
+        console().print(line, highlight=False)
     if given.out:
         console().print(f"budget.html, budget.json, budget.csv and budget.png: {given.out}", highlight=False)
+
+
+def _box(picture: scenes.Picture, given: Options) -> InstallationBox:
+    import planner
+
+    with progress(f"{picture.scene.name}: proving that poses keep U", "cells", at_once=True) as shown:
+        return planner.installation_box(picture, k=given.box, p=given.p, report=shown)
 
 
 def _check(given: Options) -> None:
@@ -110,6 +125,8 @@ def _check(given: Options) -> None:
         raise scenes.InvalidInput(f"--stations must be 0 or at least {_FEWEST_PICTURES}, got {given.stations}")
     if given.reach is not None and not (given.reach > 0 and math.isfinite(given.reach)):
         raise scenes.InvalidInput(f"--reach must be greater than 0, got {given.reach}")
+    if given.box is not None and not (given.box > 0 and math.isfinite(given.box)):
+        raise scenes.InvalidInput(f"--box must be greater than 0, got {given.box}")
     check_seed(given.seed)
     check_file("--csv", given.csv_file, ".csv")
     check_directory("--out", given.out)
