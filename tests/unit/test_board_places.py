@@ -31,7 +31,7 @@ def few():
     with pytest.MonkeyPatch.context() as patched:
         for name, value in (("_SCALES", (1.1,)), ("_COUNTS", (4, 6)), ("_PLACES", 9), ("_HALVINGS", 2)):
             patched.setattr(board_places, name, value)
-        yield place_board(scenes.load("board_block"), *POSES)
+        return place_board(scenes.load("board_block"), *POSES)
 
 
 def _value(picture, board):
