@@ -12,7 +12,7 @@ import numpy as np
 from scenes import Circle, Scene
 
 _AROUND, _DENSEST = 32, 4.0  # nodes of a ring at least, and nodes a cell where the rim is larger
-_RINGS = np.array([0.0, 0.1, 0.3, 1.0])  # of the width
+_RINGS = np.array([0.0, 0.2, 1.0])  # of the width
 _WIDE = 0.5  # of the radius, and a cell at most
 _FULL = 0.5  # of the width: so far the rings alone tell the light, beyond the face's own nodes do more and more
 _NEAR = 1.0  # of the radius: places of patches are densest so near to a rim

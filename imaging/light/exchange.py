@@ -464,8 +464,10 @@ def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
 
 def _arriving(scene: Scene, emitter: Emitter, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Irradiance of points (n, 3) of unit normals by one emitter, 0 in shadow."""
-    start, at = points + _LIFT * scene.bodies.extent * normals, np.array(emitter.at)
-    blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, (), margin=_MARGIN)
     arriving = beam(emitter, points)
-    cosine = np.maximum(np.einsum("ni,ni->n", arriving.to_light, normals), 0)
-    return np.where((blocker < 0) | (t >= 1), arriving.strength * cosine, 0.0)
+    found = arriving.strength * np.maximum(np.einsum("ni,ni->n", arriving.to_light, normals), 0)
+    turned = np.flatnonzero(found)
+    start, at = points[turned] + _LIFT * scene.bodies.extent * normals[turned], np.array(emitter.at)
+    blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, (), margin=_MARGIN)
+    found[turned[(blocker >= 0) & (t < 1)]] = 0.0
+    return found
