@@ -12,8 +12,8 @@ from imaging.light.between import _plain
 from imaging.light.emitters import emitters
 from imaging.light.places import Places
 from imaging.pictures import Pictures
-from scenes.lights import GLANCE
 from scenes import Circle
+from scenes.lights import GLANCE
 
 
 def circle(hole=True, ends=None):
@@ -68,7 +68,7 @@ def _traced(solid, white, light, points, normal, paths, rng):
     random paths, each way by Lambert's cosine, with the light's own share wherever they meet a face."""
     at, normals = np.repeat(points, paths, 0), np.broadcast_to(normal, (len(points) * paths, 3))
     found, weight, which = np.zeros(len(points)), 1.0, np.repeat(np.arange(len(points)), paths)
-    for _ in range(8):
+    for _ in range(24):
         ways = rng.normal(size=at.shape)
         ways = normals + ways / np.linalg.norm(ways, axis=1, keepdims=True)
         start, weight = at + 1e-6 * normals, white * weight
@@ -84,13 +84,13 @@ def _traced(solid, white, light, points, normal, paths, rng):
 
 
 def test_the_ground_beside_a_rim_has_the_light_that_paths_tell(cup, monkeypatch):
-    """A tenth of a millimetre from it, all around; a face told by its own nodes and even patches alone is farther off."""
+    """A tenth of a millimetre from it, all around; by a face's own nodes and even patches it is farther off."""
     picture, rim = cup
     scene, pictures = picture.scene, Pictures.of(picture)
     (shining,) = tuple(map(_plain, emitters(scene, pictures.lights, GLANCE)))
     points = rim.centre + (rim.radius + 0.1) * rim.spokes(rim.angles(24))
     faces, white = np.full(24, rim.face), scene.material.diffuse()
-    traced = _traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 12, np.random.default_rng(1))
+    traced = _traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 11, np.random.default_rng(1))
     expected = traced * shining.power
 
     def off():
