@@ -21,12 +21,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from imaging.geometry.rays import first_face
+from imaging.light.annulus import Annulus, about, measured_rims
 from imaging.light.emitters import Emitter
 from imaging.light.irradiance import beam
 from imaging.light.kept import kept
 from imaging.light.nodes import Frame, along, frame_of, goes_on, onto
 from imaging.light.places import Places, areas_of, in_unit_square, middles_of, of_sequence, ways_about
-from scenes import Floor, Scene, Solid
+from scenes import Circle, Floor, Scene, Solid
 from scenes.parts.shading import normals_at
 from scenes.parts.solid import assembled
 
@@ -35,7 +36,9 @@ if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
 _PATCHES = 400  # of the whole body
+_RIM_PATCHES, _RIM_SCALE = 400, 0.5  # beside measured rims, and cells that count as one between patches there
 _PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
+_LIT = 4  # times as many places tell what falls on patches where rims are measured: through a hole it is a small spot
 _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
 _ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly
 _ROUGH_PATCHES = 4  # about a small face, whose light is then a mean of theirs
@@ -77,6 +80,8 @@ class Exchange:
         Those faces.
     cell : float
         Side of a patch, about.
+    scale : float
+        As far apart places are no nearer than those of normals that differ by half of 90 degrees.
     places : Places
     patches : ndarray of int, shape (m,)
         The patch of each place.
@@ -86,16 +91,26 @@ class Exchange:
         Which reaches beyond its patches.
     roughly : bool
         Whether few rays tell the light, and patches that of faces that are smaller.
+    rims : tuple of Circle
+        Beside which the light is told closely.
     """
 
     solid: Solid
     faces: np.ndarray
     cell: float
+    scale: float
     places: Places
     patches: np.ndarray
     tree: KDTree
     floor: Floor | None = None
     roughly: bool = False
+    rims: tuple[Circle, ...] = ()
+
+    @cached_property
+    def annuli(self) -> dict[int, Annulus]:
+        """Beside rims on faces that see others, by numbers beyond those of the faces."""
+        some = [Annulus.beside(circle, _apart(self)) for circle in self.rims if self.has[circle.face]]
+        return dict(enumerate(some, len(self.solid.faces)))
 
     @cached_property
     def small(self) -> np.ndarray:
@@ -120,9 +135,14 @@ class Exchange:
         pairs = np.bincount(self.patches[met.starts] * count + met.patches, minlength=count * count)
         return pairs.reshape(count, count) / (rays * np.bincount(self.patches)[:, None])
 
-    def means(self, values: np.ndarray) -> np.ndarray:
-        """Of values (m,) at places those of patches, (p,)."""
-        return np.bincount(self.patches, values) / np.bincount(self.patches)
+    @cached_property
+    def lit(self) -> tuple[Places, np.ndarray]:
+        """Places that tell the light that falls on patches, and the patch of each."""
+        if not self.rims:
+            return self.places, self.patches
+        more = Places.spread(self.solid, self.faces, _LIT * len(self.places.points), after=len(self.places.points))
+        patches = self.tree.query(_placed(more.points, more.normals, self.scale))[1]
+        return self.places.joined(more), np.concatenate([self.patches, patches])
 
     def met(self, points: np.ndarray, normals: np.ndarray, rays: int, shifts: np.ndarray = np.zeros(2)) -> Hits:
         """What so many rays from each of points (n, 3) of unit normals meet.
@@ -146,7 +166,7 @@ class Exchange:
         point, ray = np.nonzero(self.has[face])  # nothing met, -1, is the last
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
-        return Hits(point, ray, places, face, self.tree.query(_placed(places, self.solid.normals[face], self.cell))[1])
+        return Hits(point, ray, places, face, self.tree.query(_placed(places, self.solid.normals[face], self.scale))[1])
 
     def _met_or_floor(
         self, face: np.ndarray, t: np.ndarray, starts: np.ndarray, ways: np.ndarray
@@ -162,12 +182,13 @@ class Exchange:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Nodes on a face, at places u along one side of its rectangle and v along the other.
+    """Nodes on a face, at places u along one side of its rectangle and v along the other; or around a rim and away
+    from it.
 
     ``met`` is what so many ``rays`` from each of them meet.
     """
 
-    frame: Frame
+    frame: Frame | Annulus
     u: np.ndarray
     v: np.ndarray
     met: Hits
@@ -195,20 +216,36 @@ class Exchanged:
     def at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """What arrives at points (..., 3) on faces (...)."""
         found, small = np.zeros(faces.shape), self.exchange.small
-        places = {face: here for face, here in _by_face(faces.ravel()) if self.exchange.has[face] and not small[face]}
-        for told, here in zip(_told(self, list(places)), places.values(), strict=True):
-            found.flat[here] = told.at(points.reshape(-1, 3)[here])
+        places = points.reshape(-1, 3)
+        asked = list(self._asked(places, faces.ravel()))
+        for told, (_, here, share) in zip(_told(self, [number for number, *_ in asked]), asked, strict=True):
+            found.flat[here] += share * told.at(places[here])
         some = small[faces] & self.exchange.has[faces]
         if some.any():
             found[some] = self._by_patches[faces[some]]
         return found
+
+    def _asked(self, points: np.ndarray, faces: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """Which annuli and faces tell the light at points (n, 3) on faces (n,): number, where, how much of it."""
+        exchange, left = self.exchange, np.ones(len(points))
+        for number, annulus in exchange.annuli.items():
+            here = np.flatnonzero(faces == annulus.circle.face)
+            share = np.minimum(annulus.share(points[here]), left[here])
+            here, share = here[share > 0], share[share > 0]
+            left[here] -= share
+            if here.size:
+                yield number, here, share
+        for face, here in _by_face(faces):
+            here = here[left[here] > 0]
+            if here.size and exchange.has[face] and not exchange.small[face]:
+                yield face, here, left[here]
 
     @cached_property
     def _by_patches(self) -> np.ndarray:
         """What arrives in the middles of all faces, (F,): a mean of what does at the patches about them."""
         solid, exchange = self.exchange.solid, self.exchange
         middles = middles_of(solid)
-        away, near = exchange.tree.query(_placed(middles, solid.normals, exchange.cell), _ROUGH_PATCHES)
+        away, near = exchange.tree.query(_placed(middles, solid.normals, exchange.scale), _ROUGH_PATCHES)
         weights = np.exp(-2 * (away**2 - away[:, :1] ** 2))
         return (weights * self.arriving[near]).sum(1) / weights.sum(1)
 
@@ -239,14 +276,14 @@ def _by_face(faces: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What arrives on a face, by places in the rectangle about it."""
+    """What arrives on a face, by places in the rectangle about it, or beside a rim."""
 
-    frame: Frame
+    frame: Frame | Annulus
     values: RectBivariateSpline
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """At points (n, 3) of the face."""
-        return self.values.ev(*np.clip((points - self.frame.corner) @ self.frame.sides.T, 0, self.frame.size).T)
+        return self.values.ev(*self.frame.coordinates(points).T)
 
 
 @kept(most=2048)
@@ -267,6 +304,8 @@ def _spline(sheet: Sheet, values: np.ndarray) -> Told:
     from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
 
     places, values = [sheet.u, sheet.v], values.reshape(sheet.u.size, sheet.v.size)
+    if sheet.frame.closed:
+        places[0], values = np.arange(-3, sheet.u.size + 3), np.pad(values, ((3, 3), (0, 0)), "wrap")
     for axis, (size, count) in enumerate(zip(sheet.frame.size, values.shape, strict=True)):
         if count == 1:
             places[axis], values = np.array([0.0, size]), np.repeat(values, 2, axis)
@@ -292,9 +331,13 @@ def room(bodies: Solid, floor: Floor | None) -> Solid:
 
 @lru_cache(maxsize=4)
 def exchange_of(
-    bodies: Solid, without: tuple[int, ...], floor: Floor | None = None, roughly: bool = False
-) -> Exchange | None:
-    """Of the faces that see others, those ``without`` left out; None where fewer than two do."""
+    bodies: Solid, without: tuple[int, ...], floor: Floor | None = None, roughly: bool = False,
+    rims: tuple[Circle, ...] = (),
+) -> Exchange | None:  # fmt: skip
+    """Of the faces that see others, those ``without`` left out; None where fewer than two do.
+
+    Patches are smaller beside those of ``rims`` that such faces meet in.
+    """
     from scipy.spatial import KDTree  # slow to load, and rarely needed
 
     solid, some = room(bodies, floor), np.setdiff1d(_seeing(bodies, floor), without)
@@ -303,9 +346,13 @@ def exchange_of(
     area = areas_of(solid.triangles[np.isin(solid.triangle_faces, some)]).sum()
     count = _PATCHES if floor is None else _PATCHES + _FLOOR_PATCHES
     places, cell = Places.spread(solid, some, count * _PLACES), float(np.sqrt(area / count))
-    coordinates = _placed(places.points, places.normals, cell)
+    rims = tuple(rim for rim in rims if np.isin(bodies.edge(rim.edges[0]).faces, some).any())
+    if rims:
+        places = places.beside(solid, some, _RIM_PATCHES * _PLACES, *about(rims))
+    scale = cell * (_RIM_SCALE if rims else 1.0)
+    coordinates = _placed(places.points, places.normals, scale)
     tree = KDTree(coordinates[_PLACES // 2 :: _PLACES])
-    return Exchange(solid, some, cell, places, tree.query(coordinates)[1], tree, floor, roughly)
+    return Exchange(solid, some, cell, scale, places, tree.query(coordinates)[1], tree, floor, roughly, rims)
 
 
 def _seeing(bodies: Solid, floor: Floor | None) -> np.ndarray:
@@ -328,7 +375,8 @@ def _placed(points: np.ndarray, normals: np.ndarray, cell: float) -> np.ndarray:
 @kept(most=2048)
 def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
     """Of faces, those of as many rays a node looked at together."""
-    bare = [_nodes(exchange, face) for face in faces]
+    beside = exchange.annuli
+    bare = [_nodes_beside(exchange, beside[face]) if face in beside else _nodes(exchange, face) for face in faces]
     found: dict[int, Hits] = {}
     for many in dict.fromkeys(sheet.rays for sheet, *_ in bare):
         which = [k for k, (sheet, *_) in enumerate(bare) if sheet.rays == many]
@@ -341,13 +389,18 @@ def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
     return (replace(sheet, met=found[k]) for k, (sheet, *_) in enumerate(bare))
 
 
+def _apart(exchange: Exchange) -> float:
+    """How far apart nodes are on a face, about."""
+    return exchange.cell * np.sqrt(_PATCHES / _CELLS)
+
+
 def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray, np.ndarray]:
     """The rectangle along a face's longest edge with nothing met yet, its nodes, their normals (n, 3) and their rays'
     shifts (n, 2); nodes that are not on the face see what the nearest place of it does.
 
     Those on its rim stand a little within, for in an inner edge light comes from both sides.
     """
-    solid, cell = exchange.solid, exchange.cell * np.sqrt(_PATCHES / _CELLS)
+    solid, cell = exchange.solid, _apart(exchange)
     frame, facet = frame_of(solid, face), not solid.plane[face]
     u, v = (along(*each, cell) for each in zip(frame.size, goes_on(solid, face, frame), strict=True))
     within = [_WITHIN * n[n > 0][0] for n in (u, v)]
@@ -361,19 +414,28 @@ def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray
     return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shift, (len(nodes), 2))
 
 
+def _nodes_beside(exchange: Exchange, annulus: Annulus) -> tuple[Sheet, np.ndarray, np.ndarray, np.ndarray]:
+    """The same beside a rim, each node's rays shifted by themselves."""
+    face, rings = annulus.circle.face, annulus.rings
+    nodes = onto(exchange.solid, face, annulus.nodes(), _WITHIN * annulus.width)
+    sheet = Sheet(annulus, np.arange(annulus.count), rings, NOTHING_MET, _FROM_NODE)
+    return sheet, nodes, np.broadcast_to(exchange.solid.normals[face], nodes.shape), in_unit_square(len(nodes))
+
+
 @lru_cache(maxsize=8)
 def exchanged(
     scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, ...], roughly: bool = False
 ) -> Exchanged | None:
     """What the faces of a scene's bodies and its floor send to each other under some emitters."""
-    exchange = exchange_of(scene.bodies, without, scene.bright_floor, roughly)
+    rims = () if roughly else measured_rims(scene)
+    exchange = exchange_of(scene.bodies, without, scene.bright_floor, roughly, rims)
     if exchange is None:
         return None
-    places, white = exchange.places, _white(scene, exchange.places.faces)
-    normals = normals_at(exchange.solid, places.faces, places.points)
+    places, patches = exchange.lit
+    white, normals = _white(scene, places.faces), normals_at(exchange.solid, places.faces, places.points)
     direct = sum(_arriving(scene, each, places.points, normals) for each in emitters)
-    lends = np.eye(exchange.tree.n) - exchange.means(white)[:, None] * exchange.between
-    sent = np.linalg.solve(lends, exchange.means(white * direct))
+    whites, lit = (np.bincount(patches, values) / np.bincount(patches) for values in (white, white * direct))
+    sent = np.linalg.solve(np.eye(exchange.tree.n) - whites[:, None] * exchange.between, lit)
     return Exchanged(scene, emitters, exchange, exchange.between @ sent)
 
 
@@ -402,8 +464,10 @@ def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
 
 def _arriving(scene: Scene, emitter: Emitter, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Irradiance of points (n, 3) of unit normals by one emitter, 0 in shadow."""
-    start, at = points + _LIFT * scene.bodies.extent * normals, np.array(emitter.at)
-    blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, (), margin=_MARGIN)
     arriving = beam(emitter, points)
-    cosine = np.maximum(np.einsum("ni,ni->n", arriving.to_light, normals), 0)
-    return np.where((blocker < 0) | (t >= 1), arriving.strength * cosine, 0.0)
+    found = arriving.strength * np.maximum(np.einsum("ni,ni->n", arriving.to_light, normals), 0)
+    turned = np.flatnonzero(found)
+    start, at = points[turned] + _LIFT * scene.bodies.extent * normals[turned], np.array(emitter.at)
+    blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, (), margin=_MARGIN)
+    found[turned[(blocker >= 0) & (t < 1)]] = 0.0
+    return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,11 @@ class Frame:
     corner: np.ndarray
     sides: np.ndarray
     size: np.ndarray
+    closed: ClassVar[bool] = False
+
+    def coordinates(self, points: np.ndarray) -> np.ndarray:
+        """Of points (n, 3) along the sides, (n, 2); outside those of the nearest place."""
+        return np.clip((points - self.corner) @ self.sides.T, 0, self.size)
 
 
 def along(size: float, goes_on: bool, cell: float) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 from scenes import Solid
 
 _PLASTIC = 1.324717957244746  # x^3 = x + 1, whose powers fill a square evenly (Roberts 2018, "R2")
+_THINNED = 16  # so many even places stand for one where places are denser: as many times denser they are at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,17 +25,33 @@ class Places:
     faces: np.ndarray
 
     @classmethod
-    def spread(cls, solid: Solid, faces: np.ndarray, count: int) -> Places:
-        """So many, evenly over the area of some faces."""
+    def spread(cls, solid: Solid, faces: np.ndarray, count: int, after: int = 0) -> Places:
+        """So many, evenly over the area of some faces; none is among the first ``after``."""
         here = np.isin(solid.triangle_faces, faces)
         triangles, of_face = solid.triangles[here], solid.triangle_faces[here]
         until = np.cumsum(areas_of(triangles))
         which = np.searchsorted(until, (np.arange(count) + 0.5) / count * until[-1])
-        a, b = in_unit_square(count).T
+        a, b = in_unit_square(after + count)[after:].T
         a, b = np.where(a + b > 1, 1 - a, a)[:, None], np.where(a + b > 1, 1 - b, b)[:, None]
         first, second, third = triangles[which].swapaxes(0, 1)
         points = first + a * (second - first) + b * (third - first)
         return cls(points, solid.normals[of_face[which]], of_face[which])
+
+    def beside(self, solid: Solid, faces: np.ndarray, count: int, about: np.ndarray, near: np.ndarray) -> Places:
+        """These and about so many more, as dense as 1 / (d^2 + s^2) at a distance d from the nearest of points
+        ``about`` (k, 3), of which ``near`` (k,) are s."""
+        from scipy.spatial import KDTree  # slow to load, and rarely needed
+
+        many = Places.spread(solid, faces, _THINNED * count, after=len(self.points))
+        away, which = KDTree(about).query(many.points)
+        until = np.cumsum(1 / (away**2 + near[which] ** 2))
+        some = np.unique(np.searchsorted(until, (np.arange(count) + 0.5) / count * until[-1]))
+        return self.joined(Places(many.points[some], many.normals[some], many.faces[some]))
+
+    def joined(self, more: Places) -> Places:
+        """These, then more."""
+        both = zip((self.points, self.normals, self.faces), (more.points, more.normals, more.faces), strict=True)
+        return Places(*map(np.concatenate, both))
 
 
 def in_unit_square(count: int) -> np.ndarray:

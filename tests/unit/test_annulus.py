@@ -1,0 +1,115 @@
+"""Light on a plane face beside a measured rim: told in rings as paths of light tell it."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import scenes
+from imaging.geometry.rays import first_face
+from imaging.light import exchange
+from imaging.light.annulus import Annulus
+from imaging.light.between import _plain
+from imaging.light.emitters import emitters
+from imaging.light.places import Places
+from imaging.pictures import Pictures
+from scenes import Circle
+from scenes.lights import GLANCE
+
+
+def circle(hole=True, ends=None):
+    """Of 2 mm radius about (1, 0, 0), its face looking up."""
+    return Circle("c", np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), 2.0, 0, (), hole, ends)
+
+
+def test_shares_fall_from_the_rim_to_none():
+    """1 up to half the width, 0 from it on, on the side of the rim where its face is."""
+    away = np.array([0.0, 0.4, 0.5, 0.75, 1.0, 2.0])
+    expected = [1, 1, 1, 0.5, 0, 0]
+    for hole, sign in ((True, 1), (False, -1)):
+        annulus = Annulus.beside(circle(hole), 10.0)
+        points = np.stack([1 + 2 + sign * away, 0 * away, 0 * away], -1)
+        assert annulus.width == 1.0
+        assert annulus.share(points) == pytest.approx(expected)
+        assert annulus.coordinates(points)[:, 1] == pytest.approx(np.minimum(away, 1.0))
+    assert Annulus.beside(circle(), 0.3).width == 0.3  # no wider than a cell
+
+
+@pytest.mark.parametrize("ends", [None, np.array([[3.0, 0, 0], [1.0, 2.0, 0]])])
+def test_nodes_stand_where_their_coordinates_are(ends):
+    """Each step around the rim is a node, ring by ring; beyond an arc's ends it tells nothing."""
+    annulus = Annulus.beside(circle(ends=ends), 10.0)
+    steps, away = annulus.coordinates(annulus.nodes()).T.reshape(2, annulus.count, -1)
+    assert steps == pytest.approx(np.repeat(np.arange(annulus.count)[:, None], annulus.rings.size, 1), abs=1e-9)
+    assert away == pytest.approx(np.repeat([np.maximum(annulus.rings, 0.01)], annulus.count, 0))
+    assert annulus.share(np.array([[-1.0, 0, 0]])) == pytest.approx(1.0 if ends is None else 0.0)
+
+
+@pytest.fixture(scope="module")
+def cup(tmp_path_factory):
+    """A picture from above of a bore of 2 mm radius in the ground of a pocket of 4 mm, 6 mm deep, which light at 35
+    degrees reaches in part, and the bore's rim."""
+    profile = [(0, 0), (12, 0), (12, 12), (4, 12), (4, 6), (2, 6), (2, 2), (0, 2)]
+    file = tmp_path_factory.mktemp("part") / "cup.ply"
+    trimesh.creation.revolve(profile, sections=48).export(file)
+    data = scenes.load("plate").model_dump(exclude={"measurands", "settings"})
+    data["object"] = {"kind": "mesh", "file": str(file)}
+    solid = scenes.Mesh.model_validate(data["object"]).solid
+    rim = next(c for c in solid.circles if c.radius < 3 and abs(c.centre[2] - 6) < 1e-3)
+    camera = {"width": 128, "height": 128, "focal_px": 8000.0, "distance": 400.0, "blur_px": 0.3, "exposure": 150.0,
+              "look_at": [0.0, 0.0, 6.0]}  # fmt: skip
+    asked = [{"name": "d", "kind": "diameter", "features": [{"circle": rim.name}]}]
+    data |= {"units": "mm", "camera": camera, "light": {"kind": "point", "distance": 400.0}, "measurands": asked}
+    scene = scenes.Scene.model_validate(data)
+    return scenes.Picture.of(scene, (0.0, 0.0), (35.0, 20.0)), scene.solid.circle(rim.name)
+
+
+def _traced(solid, white, light, points, normal, paths, rng):
+    """Irradiance of points (n, 3) by light that met other faces, over that of a light of unit power at a distance of 1:
+    random paths, each way by Lambert's cosine, with the light's own share wherever they meet a face."""
+    at, normals = np.repeat(points, paths, 0), np.broadcast_to(normal, (len(points) * paths, 3))
+    found, weight, which = np.zeros(len(points)), 1.0, np.repeat(np.arange(len(points)), paths)
+    for _ in range(24):
+        ways = rng.normal(size=at.shape)
+        ways = normals + ways / np.linalg.norm(ways, axis=1, keepdims=True)
+        start, weight = at + 1e-6 * normals, white * weight
+        face, t = first_face(solid, start, ways, ())
+        met = face >= 0
+        at, normals, which = start[met] + t[met, None] * ways[met], solid.normals[face[met]], which[met]
+        lit = light - at
+        away = np.linalg.norm(lit, axis=1)
+        cosine = np.maximum((lit * normals).sum(1) / away, 0)
+        blocked = first_face(solid, at + 1e-6 * normals, lit, ())[0] >= 0
+        found += np.bincount(which, weight * np.where(blocked, 0, cosine / away**2), len(points))
+    return found / paths
+
+
+def test_the_ground_beside_a_rim_has_the_light_that_paths_tell(cup, monkeypatch):
+    """A tenth of a millimetre from it, all around; by a face's own nodes and even patches it is farther off."""
+    picture, rim = cup
+    scene, pictures = picture.scene, Pictures.of(picture)
+    (shining,) = tuple(map(_plain, emitters(scene, pictures.lights, GLANCE)))
+    points = rim.centre + (rim.radius + 0.1) * rim.spokes(rim.angles(24))
+    faces, white = np.full(24, rim.face), scene.material.diffuse()
+    traced = _traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 11, np.random.default_rng(1))
+    expected = traced * shining.power
+
+    def off():
+        for each in (exchange.exchanged, exchange.exchange_of):
+            each.cache_clear()
+        return exchange.exchanged(scene, (shining,), ()).at(points, faces) / expected - 1
+
+    assert np.sqrt(np.mean(off() ** 2)) < 0.06  # margin: twice what is measured; 2.8 %
+    monkeypatch.setattr(exchange, "measured_rims", lambda scene: ())
+    assert np.sqrt(np.mean(off() ** 2)) > 0.07  # margin: 9 %
+
+
+def test_places_are_denser_about_a_rim():
+    """Of those that are added three times as many lie within a radius of it as of even ones, which stay."""
+    solid = scenes.load("bracket_mm").solid
+    faces, rim = np.arange(len(solid.faces)), solid.circles[0]
+    even = Places.spread(solid, faces, 2000)
+    both = even.beside(solid, faces, 2000, rim.around(32), np.full(32, rim.radius))
+    near = np.linalg.norm(both.points - rim.centre, axis=1) < 2 * rim.radius
+    assert len(both.points) > 3000
+    assert near[2000:].mean() > 3 * near[:2000].mean() > 0
+    assert (both.points[:2000] == even.points).all()
