@@ -55,6 +55,20 @@ def test_no_drawn_pose_is_below_the_bound_of_its_cell(name, half):
         assert np.median(bound / least) > 0.9
 
 
+def test_a_cell_may_have_no_part_that_sees_its_faces(monkeypatch):
+    """What is divided then has no parts, and what is not keeps its own."""
+    scene = scenes.load("task1")
+    boxes = Boxes(*np.radians([[[20.0, 24.0], [30.0, 34.0]], [[10.0, 14.0], [20.0, 24.0]]]))
+    cells = SensorCells(SensorTerms(scene, SearchProblem.of(scene, "calibrated", "object").objective), boxes)
+    monkeypatch.setattr(cells, "_is_possible", lambda boxes, seen: np.zeros(len(boxes.polar), bool))
+    assert cells.quarters(np.array([0]))[0].size == 0
+    monkeypatch.undo()
+    first = len(cells.lost)
+    parts = cells.quarters(np.array([0, 1]))
+    assert (parts[0].size, parts[1].tolist()) == (0, list(range(first, len(cells.lost))))
+    assert len(cells.lost) > first
+
+
 def test_random_cells_of_any_size():
     """1000 cells, of which the widest tell little; a bound that is 2 % too high is caught."""
     caught = 0
