@@ -175,26 +175,25 @@ def _half(quantity) -> float:
     return quantity.tolerance.half
 
 
-@dataclass
 class _Search:
     """Of the largest box, so many times that of ``LARGEST``.
 
     Attributes
     ----------
+    whole : PoseBox
+    demand : Demand
+    most : int
+        Pairs of cells, of each box that is tried.
     factor, too_large : float
         Of the box that is proved, and of the least one that is known to hold a pose ``against`` it.
     pairs : int
         Pairs of cells that were bounded.
     """
 
-    whole: PoseBox
-    demand: Demand
-    most: int
-    report: Report
-    factor: float = 0.0
-    too_large: float = np.inf
-    against: Pair | None = None
-    pairs: int = 0
+    def __init__(self, whole: PoseBox, demand: Demand, most: int, report: Report) -> None:
+        self.whole, self.demand, self.most, self.report = whole, demand, most, report
+        self.factor, self.too_large, self.pairs = 0.0, np.inf, 0
+        self.against: Pair | None = None
 
     @classmethod
     def of(cls, picture: Picture, demand: Demand, most: int, report: Report) -> _Search:

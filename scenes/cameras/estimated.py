@@ -46,7 +46,7 @@ def covariance(scene: Scene) -> np.ndarray:
     --------
     >>> import scenes
     >>> scene = scenes.load("board_block").with_(
-    ...     placement={"camera": ["focal", "k1"]}, uncertain=[{"key": "camera.focal_px", "sd": 4.8}]
+    ...     placement={"camera": ["focal", "k1"]}, uncertain=[{"key": "camera.focal_px", "sd": 5.4}]
     ... )
     >>> np.sqrt(np.diag(covariance(scene))).round(4).tolist()
     [0.005, 0.1]

@@ -21,22 +21,21 @@ from validation.simulation import corrections, inputs
 ESTIMATORS = ("gradient", "isophote", "canny", "strip", "arrangement")
 
 
+CROWDED = ((39.6, 185.1), (30.8, 89.1)), ((45.9, 209.0), (26.7, 316.1)), ((33.6, 342.3), (16.6, 290.2))
+"""The first random poses at which the classic locator is off by 0.5 sigma or more, and all estimators measure."""
+
+
 @pytest.fixture(scope="module")
 def crowded(small_task1):
-    """(picture, exact image, other renders) at random poses at which every estimator measures, and the classic locator
-    is off by 0.5 sigma or more."""
-    rng, found = np.random.default_rng(7), []
-    while len(found) < 3:
-        sensor, light = (Pose(*rng.uniform((low, 0), (60, 360))) for low in (5, 2))
+    """(picture, exact image, other renders) there."""
+    found = []
+    for sensor, light in CROWDED:
         picture = Picture.of(small_task1, sensor, light)
         exact = block_image(small_task1, sensor, light)
         told = measure.propagate(exact, picture).measurands
-        if not (np.isfinite(told.value[0]) and abs(told.bias[0]) > 0.5 * np.sqrt(told.covariance[0, 0])):
-            continue
-        states = {measure.propagate(exact, picture, estimator=each).measurands.status[0] for each in ESTIMATORS}
-        if states <= {"ok", "clutter"}:
-            renders = tuple(render.image(picture, quality=render.Quality(seed=seed)) for seed in (1, 2))
-            found.append((picture, exact, renders))
+        assert abs(told.bias[0]) > 0.5 * np.sqrt(told.covariance[0, 0])
+        renders = tuple(render.image(picture, quality=render.Quality(seed=seed)) for seed in (1, 2))
+        found.append((picture, exact, renders))
     return found
 
 
@@ -48,14 +47,11 @@ def test_what_is_left_of_an_exact_image_is_what_it_is_told_with(crowded, estimat
     for picture, exact, renders in crowded:
         off = measure.correction(Images(renders), picture, estimator)
         found = measure.measure(exact, picture, correction=off)
-        if not np.isfinite(found.value[0]):
-            continue
         true = _length(picture)
         left.append((found.value[0] - true) / off.sigma[0])
         raw.append(off.bias[0] / off.sigma[0])
         told.append(off.u_bias[0] / off.sigma[0])
     left, raw, told = map(np.array, (left, raw, told))
-    assert len(left) >= 2
     assert np.abs(left).max() < 0.15  # margin: half of what `ok` allows, five times the renders' noise
     if estimator in ("gradient", "canny"):
         assert np.abs(raw).max() > 0.5

@@ -68,7 +68,7 @@ def test_files_are_found_wherever_a_document_names_them(tmp_path):
     assert told["seed"] == 3
 
 
-@pytest.mark.parametrize("module", ["dimmed", "simulation", "remeasured", "work", "photographs"])
+@pytest.mark.parametrize("module", ["simulation", "remeasured", "work", "photographs"])
 def test_a_run_is_of_the_code_that_made_its_numbers(module, tmp_path, monkeypatch):
     before = job._code()
     (tmp_path / "changed.py").write_text("another = 1\n")
