@@ -151,10 +151,7 @@ def with_board(picture: Picture, board: Board) -> Picture:
     """
     scene = picture.scene
     scale = board.pitch / scene.placement.board.pitch
-    told = [each.model_dump(exclude_none=True) for each in scene.uncertain]
-    for row in told:
-        if row["key"] == PITCH:
-            row |= {name: value for name, value in _widths(UncertainNumber(**row), scale).items() if value is not None}
+    told = [each.model_dump(exclude_none=True) for each in _with_pitch(scene, scale)]
     return picture.with_scene(scene.with_(placement={"board": board.model_dump()}, uncertain=told))
 
 
@@ -182,8 +179,7 @@ class _Search:
 
     def _tried(self, board: Board) -> Pictures:
         scene, scale = self.picture.scene, board.pitch / self.board.pitch
-        told = [each.tried(**_widths(each, scale)) if each.key == PITCH else each for each in scene.uncertain]
-        tried = scene.tried(placement=scene.placement.tried(board=board), uncertain=tuple(told))
+        tried = scene.tried(placement=scene.placement.tried(board=board), uncertain=_with_pitch(scene, scale))
         return Pictures.of(self.picture.with_scene(tried))
 
     def objective(self, board: Board) -> float:
@@ -284,9 +280,13 @@ class _Search:
         return board
 
 
-def _widths(told: UncertainNumber, scale: float) -> dict[str, float | None]:
-    """What says how well a number is known, of one so many times as large."""
-    return {"sd": _times(told.sd, scale), "half_width": _times(told.half_width, scale)}
+def _with_pitch(scene: Scene, scale: float) -> tuple[UncertainNumber, ...]:
+    """The scene's uncertain numbers with a pitch so many times as large, known as well as a part of it."""
+
+    def grown(each: UncertainNumber) -> UncertainNumber:
+        return each.tried(sd=_times(each.sd, scale), half_width=_times(each.half_width, scale))
+
+    return tuple(grown(each) if each.key == PITCH else each for each in scene.uncertain)
 
 
 def _times(value: float | None, scale: float) -> float | None:

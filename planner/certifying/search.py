@@ -10,13 +10,12 @@ from imaging.geometry.projection import direction
 from planner.certifying.cells import Boxes, LightCells, SensorCells, bounds
 from planner.certifying.enclosed import HUGE
 from planner.certifying.light_terms import LightTerms
+from planner.certifying.pairs import TRIED, bounded, divided, every, middles
 from planner.certifying.sensor_terms import SensorTerms
 from planner.search.objective import Report, SearchProblem, cut_off
 
 SENSORS, LIGHTS = 7.5, 10.0  # degrees, of the first cells
 _ALONE = np.radians(1.0)  # radius down to which sensors' cells are divided before there are any of lights
-_CHUNK = 4096  # pairs of cells at a time
-_TRIED = 64  # middles of pairs of cells that are evaluated at a time
 _FINE = 0.125  # of a light's cell: the sensor's is divided first until it is so small, where its slopes are not bounded
 
 
@@ -108,14 +107,11 @@ class Search:
             wide = open_[~out & ~fine]
             parts = self.sensors.quarters(wide)
             open_ = np.concatenate([np.zeros(0, int), *(parts[int(each)] for each in wide)])
-        grid = np.meshgrid(np.concatenate(kept), np.arange(len(self.lights.hot)), indexing="ij")
-        return np.stack(grid, -1).reshape(-1, 2)
+        return every(np.concatenate(kept), np.arange(len(self.lights.hot)))
 
     def _bounded(self, pairs: np.ndarray, lights: LightCells | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of pairs; `HUGE` of those that no constraint allows."""
-        told = [bounds(self.sensors, lights or self.lights, pairs[at : at + _CHUNK])
-                for at in range(0, len(pairs), _CHUNK)]  # fmt: skip
-        bound, parts = (np.concatenate([each[k] for each in told]) for k in (0, 1))
+        bound, parts = bounded(bounds, self.sensors, lights or self.lights, pairs)
         self.found = replace(self.found, pairs=self.found.pairs + len(pairs))
         return (bound, parts) if lights else (np.where(self._is_allowed(pairs), bound, HUGE), parts)
 
@@ -132,9 +128,9 @@ class Search:
 
     def _try(self, pairs: np.ndarray, bound: np.ndarray) -> None:
         """Evaluate the middles of the most promising."""
-        best = pairs[np.argsort(bound)[:_TRIED]]
+        best = pairs[np.argsort(bound)[:TRIED]]
         problem, found = self.problem, self.found
-        s, k = (cells.boxes.middles[best[:, i]] for i, cells in enumerate((self.sensors, self.lights)))
+        s, k = middles(self.sensors, self.lights, best)
         if not len(best):
             return
         values = np.where(problem.constraints.allowed(problem.scene, s, k), problem.values(s, k), np.inf)
@@ -148,20 +144,4 @@ class Search:
         size = [cells.boxes.radii[pairs[:, k]] for k, cells in enumerate((self.sensors, self.lights))]
         wild = parts[:, 0] >= 1e30  # slopes of the sensor's terms are not bounded
         by_sensor = np.where(wild, size[0] > _FINE * size[1], parts[:, 0] >= parts[:, 1])
-        return np.concatenate([
-            parted(self.sensors, pairs[by_sensor], 0), parted(self.lights, pairs[~by_sensor], 1),
-        ])  # fmt: skip
-
-
-def parted(cells: SensorCells | LightCells, pairs: np.ndarray, role: int) -> np.ndarray:
-    """Each pair as often as its cell has parts, with these instead."""
-    different, which = np.unique(pairs[:, role], return_inverse=True)
-    known = cells.quarters(different)
-    parts = [known[int(each)] for each in different]
-    count = np.array([len(each) for each in parts], int)
-    many = count[which]
-    found = np.repeat(pairs, many, axis=0)
-    place = np.arange(len(found)) - np.repeat(np.cumsum(many) - many, many)
-    if len(found):
-        found[:, role] = np.concatenate(parts)[np.repeat((np.cumsum(count) - count)[which], many) + place]
-    return found
+        return divided(self.sensors, self.lights, pairs, by_sensor)

@@ -9,14 +9,13 @@ import numpy as np
 from planner.certifying.cells import Boxes, LightCells, SensorCells
 from planner.certifying.demand import Demand
 from planner.certifying.light_terms import LightTerms
+from planner.certifying.pairs import TRIED, bounded, divided, every, middles
 from planner.certifying.pose_box import Ranges
-from planner.certifying.search import LIGHTS, SENSORS, parted
+from planner.certifying.search import LIGHTS, SENSORS
 from planner.certifying.sensor_terms import SensorTerms
 from planner.certifying.upper import upper_bounds
 from planner.search.objective import Aim
 
-_CHUNK = 4096  # pairs of cells at a time
-_TRIED = 64  # middles of pairs of cells that are evaluated at a time
 Pair = tuple[np.ndarray, np.ndarray]  # of a sensor's pose (2,) and a light's, degrees
 
 
@@ -62,8 +61,8 @@ class Within:
 
     def proved(self, most: int, report) -> Told:
         """Until every pair of cells keeps the demand, one of their poses does not, or ``most`` pairs were bounded."""
-        grid = np.meshgrid(np.arange(len(self.sensors.lost)), np.arange(len(self.lights.hot)), indexing="ij")
-        pairs, told = np.stack(grid, -1).reshape(-1, 2), Told(False, 0, np.zeros(len(self.demand.limits)))
+        pairs = every(np.arange(len(self.sensors.lost)), np.arange(len(self.lights.hot)))
+        told = Told(False, 0, np.zeros(len(self.demand.limits)))
         while len(pairs):
             if told.pairs + len(pairs) > most:
                 return told
@@ -85,9 +84,7 @@ class Within:
             boxes = self.sensors.boxes.some(new)
             found = np.stack(self.demand.inputs.of(boxes.polar, boxes.azimuth), 1)
             self.inputs = np.concatenate([self.inputs, found])
-        told = [upper_bounds(self.sensors, self.lights, pairs[at : at + _CHUNK])
-                for at in range(0, len(pairs), _CHUNK)]  # fmt: skip
-        noise, parts = (np.concatenate([each[k] for each in told]) for k in (0, 1))
+        noise, parts = bounded(upper_bounds, self.sensors, self.lights, pairs)
         most, off = np.moveaxis(self.inputs[pairs[:, 0]], 1, 0)
         parts[:, 0] += off.sum(-1)
         return self.demand.u2(noise, most), parts
@@ -96,14 +93,11 @@ class Within:
         """The middle of one of the pairs that looks worst, if that does not keep the demand."""
         if not len(pairs):
             return None
-        worst = pairs[np.argsort(-u2.max(-1))[:_TRIED]]
-        s, k = (cells.boxes.middles[worst[:, i]] for i, cells in enumerate((self.sensors, self.lights)))
+        worst = pairs[np.argsort(-u2.max(-1))[:TRIED]]
+        s, k = middles(self.sensors, self.lights, worst)
         wrong = np.flatnonzero(~self.demand.is_met(s, k))
         return (s[wrong[0]], k[wrong[0]]) if len(wrong) else None
 
     def _divided(self, pairs: np.ndarray, parts: np.ndarray) -> np.ndarray:
         """The pairs of which one cell is cut in four: that which makes the bound worse."""
-        by_sensor = parts[:, 0] >= parts[:, 1]
-        return np.concatenate([
-            parted(self.sensors, pairs[by_sensor], 0), parted(self.lights, pairs[~by_sensor], 1),
-        ])  # fmt: skip
+        return divided(self.sensors, self.lights, pairs, parts[:, 0] >= parts[:, 1])
