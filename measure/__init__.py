@@ -4,17 +4,15 @@ import ice_vision
 
 ice_vision.check(__file__, "scenes", "imaging")
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from measure.best import best_estimator
-from measure.boards.camera import CameraCalibration, calibrate_camera
 from measure.boards.charuco import charuco
 from measure.boards.chessboard import Board, chessboard
-from measure.boards.cross_validation import Compared, compare_models
 from measure.boards.dots import dot_grid
 from measure.boards.marker_grid import marker_grid
-from measure.boards.next_pose import NextBoard, next_board
-from measure.boards.projections import Difference, projection_difference
 from measure.bounds import bound
-from measure.bundle import Bundled, bundle
 from measure.correction import Images, correction
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
 from measure.features.conic import Ellipse, fit_ellipse
@@ -36,6 +34,33 @@ from measure.photon_transfer import FramePair, PhotonTransfer, photon_transfer
 from measure.placement import Located, locate
 from measure.propagation import Propagated, PropagatedValues, propagate
 from measure.region import region_of_interest
+
+if TYPE_CHECKING:
+    from measure.boards.camera import CameraCalibration, calibrate_camera
+    from measure.boards.cross_validation import Compared, compare_models
+    from measure.boards.next_pose import NextBoard, next_board
+    from measure.boards.projections import Difference, projection_difference
+    from measure.bundling import Bundled, bundle
+
+_LATER = {
+    "CameraCalibration": "boards.camera", "calibrate_camera": "boards.camera",
+    "Compared": "boards.cross_validation", "compare_models": "boards.cross_validation",
+    "NextBoard": "boards.next_pose", "next_board": "boards.next_pose",
+    "Difference": "boards.projections", "projection_difference": "boards.projections",
+    "Bundled": "bundling", "bundle": "bundling",
+}  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """What calibrates cameras and adjusts several pictures is loaded when asked for: it takes a second to load."""
+    if name in _LATER:
+        return getattr(import_module(f"measure.{_LATER[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LATER})
+
 
 __all__ = [
     "ESTIMATORS",

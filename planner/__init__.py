@@ -12,7 +12,6 @@ from imaging.features.measurand import required_edges
 from imaging.features.projected_edges import projected_edges
 from imaging.pictures import Pictures
 from imaging.pose_scatter import pose_scatter
-from planner.bundles import BundlePrediction, predict_bundle
 from planner.combining import Combination, combine
 from planner.constraints import Constraints
 from planner.covering import Coverage, coverage
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from planner.budgeting.budgets import SceneBudget, budget
     from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
+    from planner.bundles import BundlePrediction, predict_bundle
     from planner.certifying.certificate import Certificate, certified
     from planner.certifying.installation import InstallationBox, installation_box
 
@@ -41,13 +41,14 @@ _LATER = {
     "BoardPlan": "board_places", "place_board": "board_places",
     "BundleBudget": "budgeting.bundles", "SceneBudget": "budgeting.budgets", "budget": "budgeting.budgets",
     "bundle_budget": "budgeting.bundles", "CapabilityPlan": "budgeting.plans", "plan_capability": "budgeting.plans",
+    "BundlePrediction": "bundles", "predict_bundle": "bundles",
     "Certificate": "certifying.certificate", "certified": "certifying.certificate",
     "InstallationBox": "certifying.installation", "installation_box": "certifying.installation",
 }  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    """Budgets and certificates are loaded when they are asked for: statistics take a third of a second."""
+    """Budgets, bundles and certificates are loaded when they are asked for: statistics take a third of a second."""
     if name in _LATER:
         return getattr(import_module(f"planner.{_LATER[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

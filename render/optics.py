@@ -7,7 +7,6 @@ import math
 import cv2
 import numpy as np
 from numpy.polynomial import chebyshev
-from scipy.interpolate import BarycentricInterpolator
 from scipy.ndimage import map_coordinates
 
 from imaging.geometry.blur import blur_in_focus, drift
@@ -115,6 +114,8 @@ def drawn(low: float, high: float) -> int:
     """
     if high - low < 1e-12:
         return 1
+    from scipy.interpolate import BarycentricInterpolator  # slow to load, and rarely needed
+
     at = np.linspace(low, high, 65)
     waves = np.exp(np.linspace(-12, 3, 121)[:, None] - low)  # half the squared frequency
     for count in range(2, _MOST_DRAWN):

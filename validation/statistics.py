@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special, stats
+from scipy import special
 
 from scenes.status import OK, counted, is_trusted
 
@@ -361,6 +361,8 @@ def correlation(first: ArrayLike, second: ArrayLike) -> dict[str, float] | None:
     pairs = pairs[np.isfinite(pairs).all(1)]
     if len(pairs) < 3 or np.ptp(pairs, axis=0).min() == 0:
         return None
+    from scipy import stats  # half a second to load, which a measurement does not need
+
     return {
         "pearson": float(stats.pearsonr(*pairs.T).statistic),
         "spearman": float(stats.spearmanr(*pairs.T).statistic),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
 from planner.uncertainty.conformity import COVERAGE, Decision
 from scenes import InvalidInput
@@ -91,6 +91,8 @@ class ZoneSize:
         """Size that is not exceeded with a probability, 0 < p < 1."""
         if not 0 < p < 1:
             raise InvalidInput(f"p must be between 0 and 1, got {p}")
+        from scipy import optimize  # slow to load, and rarely needed
+
         low, high = self._reach
         if high <= low:
             return self.factor * low

@@ -67,3 +67,21 @@ def test_what_a_command_may_say_is_known_before_anything_that_computes_is_loaded
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert {"scenes", "validation"} <= set(loaded)
     assert {"imaging", "planner", "measure", "render", "scipy", "mitsuba", "matplotlib"} & set(loaded) == set()
+
+
+@pytest.mark.parametrize("needed", ["measure", "validation.simulation", "validation.inspection"])
+def test_measuring_waits_for_no_statistics_and_no_splines(needed: str):
+    """`ice measure` of a scene loads neither; adjusting pictures together and calibrating do, when asked for."""
+    code = f"import sys, {needed}; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {"scipy.special", needed} <= set(loaded)
+    assert {"scipy.stats", "scipy.interpolate", "scipy.optimize", "measure.boards.camera"} & set(loaded) == set()
+
+
+def test_what_is_loaded_later_is_all_there():
+    import measure
+    import planner
+
+    for package in (measure, planner):
+        assert set(package._LATER) <= set(package.__all__)
+        assert all(callable(getattr(package, name)) for name in package.__all__ if name in package._LATER)
