@@ -124,7 +124,9 @@ def _release(path: str) -> tuple[int, ...]:
 
 
 def _works(library: str) -> bool:
-    """Whether a separate process can compile and run with this libLLVM."""
+    """Whether a separate process can compile and run with this libLLVM; not where there is no such file."""
+    if Path(library).is_absolute() and not Path(library).exists():
+        return False
     return _runs(_PROBE, {**os.environ, _LIBRARY: library})
 
 

@@ -21,9 +21,17 @@ def _fresh(monkeypatch):
     variant.choose.cache_clear()
 
 
-def test_missing_library_means_scalar(monkeypatch, tmp_path):
+def test_missing_library_means_scalar_without_a_trial(monkeypatch, tmp_path):
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "none.so"))
+    monkeypatch.setattr(variant, "_PROBE", "pass")  # a trial would succeed
     assert variant.choose() == variant.SCALAR
+
+
+def test_library_by_its_name_alone_is_tried(monkeypatch):
+    """The loader of libraries finds it where it looks."""
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "libLLVM.so")
+    monkeypatch.setattr(variant, "_PROBE", "pass")
+    assert variant.choose() == variant.LLVM
 
 
 def test_file_that_is_no_library_means_scalar(monkeypatch, tmp_path):
@@ -32,10 +40,10 @@ def test_file_that_is_no_library_means_scalar(monkeypatch, tmp_path):
     assert variant.choose() == variant.SCALAR
 
 
-def test_library_that_aborts_the_process_means_scalar(monkeypatch):
+def test_library_that_aborts_the_process_means_scalar(monkeypatch, tmp_path):
     """What LLVM 15 does: the probing process dies by a signal, and nothing of it reaches this one."""
     monkeypatch.setattr(variant, "_PROBE", "import os; os.abort()")
-    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/any")
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path))
     assert variant.choose() == variant.SCALAR
 
 
