@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation, gaussian_filter, gaussian_gradient_magnitude, label, uniform_filter
+from scipy.ndimage import binary_dilation, gaussian_gradient_magnitude, label, uniform_filter
 
 from imaging.sensor import full_scale, recorded
 from measure.adjustment import Adjustment, means
@@ -17,7 +17,6 @@ _OF_RAYS = 1.5  # of one image's variance by rays: of two on the mean, and of a 
 _LEAST = 16  # blocks of a region, and that tell of an input
 _NEAR = 5  # blocks a side over which rays scatter alike
 _STEEP = 1.0  # change over a pixel, in the noise's standard deviation, that is an edge's
-_RAYS, _AROUND = 3.0, 5.0  # times what rays change over a pixel, the root mean square within so many px
 _NEAR_END = 4.0  # standard deviations of noise below the end of the scale
 _ENOUGH = 4  # sums for each input, to tell it
 _CHANCE = 5.0  # standard deviations of products of noise, which are no information
@@ -44,7 +43,7 @@ def adjustment(renders: np.ndarray, picture: Picture) -> Adjustment | None:
     side = _SIDE * math.ceil(math.sqrt(clean.size / _SIDE**2 / _MOST))
     level, variance = recorded(noise, clean)
     deviation = np.sqrt(np.broadcast_to(variance, clean.shape))
-    steep = gaussian_gradient_magnitude(clean, 1.0) > np.hypot(_STEEP * deviation, _grain(renders[:, 0]))
+    steep = gaussian_gradient_magnitude(clean, 1.0) > _STEEP * deviation
     near = math.ceil(3 * picture.scene.camera.most_blur_px) + 1
     lost = binary_dilation(steep, iterations=near) | (level > full_scale(noise) - _NEAR_END * deviation)
     regions = _regions(means(lost[None], side)[0] == 0)
@@ -67,13 +66,6 @@ def adjustment(renders: np.ndarray, picture: Picture) -> Adjustment | None:
     normal, spread = (np.array(each) for each in zip(*told, strict=True))
     columns = np.concatenate([made.columns[:, :-1] * asked, levels], 1)
     return replace(made, columns=columns, normal=normal, spread=spread)
-
-
-def _grain(levels: np.ndarray) -> np.ndarray:
-    """Change over a pixel that noise of rays alone may make in the mean of two images (2, height, width), which is no
-    edge's, (height, width)."""
-    of_noise = gaussian_gradient_magnitude((levels[0] - levels[1]) / 2, 1.0) ** 2
-    return _RAYS * np.sqrt(gaussian_filter(of_noise, _AROUND))
 
 
 def _by_many_blocks(made: Adjustment) -> np.ndarray:

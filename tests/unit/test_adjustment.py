@@ -111,21 +111,6 @@ def test_what_shows_edges_only_tells_nothing(picture):
     assert adjusting.adjustment(np.array([[busy] * 4] * 2), picture) is None
 
 
-def test_noise_of_rays_is_no_edge(picture):
-    """Near the foot of the wall, where light of it tells of reflectances and its noise of rays is 25 levels, that of a
-    render; an edge of 60 levels stays one."""
-    grain = 25.0 * EDGE * (X < 200) * np.random.default_rng(7).normal(size=(2, 1, *BASE.shape))
-    sets = _sets(CHANGES, np.random.default_rng(8))
-    sets[:, :1] += grain
-    step = np.abs(gaussian_filter(sets[:, 0].mean(0), 1.0, order=(0, 1)))
-    foot = (X > 165) & (X < 190)
-    assert (step[foot] > SIGMA).mean() > 0.5  # negative control: by the picture's noise alone it would be an edge's
-    at = adjusting.adjustment(sets, picture).at * 8
-    inside = (at[:, 1] >= 160) & (at[:, 1] < 192)
-    assert inside.mean() > 0.9 * 32 / COLUMNS
-    assert not ((at[:, 1] <= 150) & (at[:, 1] + 8 > 150)).any()
-
-
 def test_sources_add_up_to_the_joint_uncertainty(picture):
     adjustment = adjusting.adjustment(_sets(CHANGES, np.random.default_rng(4)), picture)
     moved = np.array([[0.3, 0.0, 1.0], [0.1, 0.0, -1.0], [0.2, 0.0, np.nan]])
