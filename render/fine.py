@@ -216,12 +216,14 @@ class _Tracer:
             return refine(loaded, self.rays, fine, marked, rays)
         return self._tiles(loaded, active, rays).rendered(fine, marked, rays, (self.quality.seed, 0))
 
-    def _tiles(self, loaded: Any, active, rays: int, divided: int = 1, sampler: str = "multijitter") -> Tiles:
+    def _tiles(self, loaded: Any, active, rays: int, divided: int = 1, sampler: str | None = None) -> Tiles:
         """Of fine pixels, in scalar variants."""
         size, crop = self.film(divided)
-        seen = view(self.mitsuba, self.picture, active, size, crop, rays) | {"sampler": {"type": sampler}}
-        if self.quality.alike and divided == 1 and "light_size" not in active:
-            seen["sampler"] = {"type": "stratified", "jitter": False}  # of a light's faces it would find a few alone
+        seen = view(self.mitsuba, self.picture, active, size, crop, rays)
+        seen |= {"sampler": {"type": sampler or "multijitter"}}
+        if self.quality.alike and sampler is None and divided == 1 and "light_size" not in active:
+            # a grid: of the faces of a light, or ways from face to face, it would find a few alone
+            seen["sampler"] = {"type": "stratified", "jitter": False}
         sight = Sight.of(self.picture, active, self.quality.supersample // divided)
         return Tiles(self.mitsuba, loaded, seen, (crop[0].start, crop[1].start), sight)
 

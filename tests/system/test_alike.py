@@ -9,6 +9,9 @@ import pytest
 import measure
 import render
 import scenes
+from imaging.geometry.projection import project
+from imaging.light.appearance import face_signal
+from imaging.light.between import light_between
 from imaging.models.bias import bias
 from imaging.pictures import Pictures
 from render import fine, large
@@ -113,6 +116,27 @@ def test_light_between_surfaces_is_compared_apart_where_all_of_an_image_is_rende
     assert abs(moved(4)) < 0.003  # six seeds: up to 0.0011, and noise of the true value's is 0.0003
     monkeypatch.setattr(fine._Tracer, "is_large", False)
     assert abs(moved(4)) > 0.005  # 0.0098
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_light_between_surfaces_comes_from_everywhere_with_one_ray_a_pixel(seed):
+    """What the upright of `grey_floor` sends to places 4 to 10 cm before it, in whole pixels, against the closed form.
+
+    The closed form (`light_between`): 6.5 levels on the mean of 66 places. Measured, six seeds: 6.0 to 7.1. In a grid
+    that is the same in all pixels no ray from there meets the upright: 0.02 levels.
+    """
+    scene = scenes.load("grey_floor")
+    camera = scene.camera.tried(width=128, height=120, focal_px=400.0)
+    here = Picture.of(scene.tried(camera=camera), Pose(46.2, 251.0), (Pose(23.6, 6.1),))
+    x, y = np.meshgrid(np.arange(4.0, 9.1, 0.5), np.arange(2.0, 5.6, 0.7))
+    points = np.stack([x, y, np.full(x.shape, 2.5)], -1).reshape(-1, 3)
+    pictures, top = Pictures.of(here), np.zeros(len(points), int)
+    direct, between = face_signal(pictures, points, top, 0), light_between(pictures, points, top)
+    quality = replace(FEW, supersample=1, edge_samples=4, everywhere=True, seed=seed)
+    image = render.image(here, quality=quality, variant=SCALAR) - scene.noise.dark_level
+    column, row = np.rint(project(points, np.array(list(here.sensor)), here.scene.camera)).astype(int).T
+    found = (image[row, column] - direct).mean()
+    assert found == pytest.approx(between.mean(), rel=0.3)  # margin: five standard deviations by noise of 16 rays
 
 
 def test_a_half_shadow_of_a_ring_is_no_staircase():
