@@ -292,7 +292,7 @@ def _second(steps: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.nd
 
 
 def _rival(steps, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
-    """How steep another crossing in the search window (n,) is at most, which noise may let win, over the slope, (n,)."""
+    """How steep another crossing in the search window (n,), which noise may let win, is at most, over the slope."""
     places = np.linspace(-1, 1, _LOOKED)
     told = np.stack([_second(steps, where, place * window)[0] for place in places], 1) * np.sign(slope)[:, None]
     left, right = told[:, :-1], told[:, 1:]
