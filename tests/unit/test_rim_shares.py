@@ -76,6 +76,6 @@ def test_what_correlation_lacks_where_shares_change(arc, rng):
         double = each[some] @ kernel @ each[some] * (arc / fine) ** 2
         lacks = (2 * np.sqrt(np.pi) * (share**2).sum() * arc - double) / 2
         found = _at_ends(share, np.ones((share.size, 1)), np.full(share.size, arc))[0, 0]
-        assert found == pytest.approx(lacks, rel=5e-3)
+        assert found == pytest.approx(lacks, rel=2e-3)
         if arc < 1:
             assert (np.diff(share) ** 2).sum() != pytest.approx(lacks, rel=0.2)
