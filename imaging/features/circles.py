@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import erfc
 
 from imaging.features.locator import reach
 from imaging.features.rim_look import look
@@ -29,6 +30,8 @@ from scenes import Circle
 
 LEAST_CLEAR = 0.25  # part of the seen rim that must be undisturbed, or all of it is taken and its circle is `clutter`
 LEAST_SEEN = 0.1  # of a whole turn: what of a rim must have contrast; an arc is too short where less lies off its ends
+HALF = 0.5  # so much a place must count to be one that is undisturbed
+_FAR = 4.0  # smoothing scales: beyond, errors are independent
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +49,10 @@ class RimImage:
         Squared contrast, 0 at hidden points.
     noise_variance : ndarray, shape (..., n), or float
         Mean of both sides, grey levels^2.
-    clear : ndarray of bool, shape (..., n)
-        Whether what the locator finds there is known. In one picture `RimLook.good`; in many whether it is undisturbed:
-        the far rim of the wall beside, where the wall is seen, the straight edges around the circle's face, and jumps
-        of the contrast along the rim are `locator.reach` away.
+    known : ndarray, shape (..., n)
+        How much what the locator finds there is known, 0 to 1. In one picture `RimLook.share`; in many whether it is
+        undisturbed: the far rim of the wall beside, where the wall is seen, the straight edges around the circle's
+        face, and jumps of the contrast along the rim are `locator.reach` away.
     turn : float
         How much of a whole turn the points stand for, 1 but for arcs.
     off_ends : ndarray of bool, shape (..., n), optional
@@ -64,7 +67,7 @@ class RimImage:
     arc: np.ndarray
     squared: np.ndarray
     noise_variance: np.ndarray | float
-    clear: np.ndarray
+    known: np.ndarray
     turn: float = 1.0
     off_ends: np.ndarray | None = None
     blur: np.ndarray | float = 0.0
@@ -77,6 +80,16 @@ class RimImage:
         if self.off_ends is None:
             return np.ones(self.squared.shape[:-1])
         return np.broadcast_to(self.turn * self.off_ends.mean(-1), self.squared.shape[:-1])
+
+    @property
+    def clear(self) -> np.ndarray:
+        """Which points are undisturbed, bool, shape (..., n)."""
+        return self.known >= HALF
+
+    @property
+    def share(self) -> np.ndarray:
+        """How much points count, shape (..., n): what is known there, or all where too little is."""
+        return np.where(self.crowded[..., None], 1.0, self.known)
 
     @property
     def crowded(self) -> np.ndarray:
@@ -115,7 +128,7 @@ def rim(pictures: Pictures, circle: Circle, *, fall_off: bool = True) -> RimImag
     if seen is not None:
         squared = np.where(seen_along(pictures, circle, angle), seen.squared, 0.0)
         squared = _off(squared, off_ends)
-        return RimImage(design, arc, squared, seen.noise_variance, seen.good, turn, off_ends, blur, place, normal)
+        return RimImage(design, arc, squared, seen.noise_variance, seen.share, turn, off_ends, blur, place, normal)
     squared, noise = contrast_along(pictures, circle, angle, fall_off=fall_off)
     shift = shading_shift(pictures, circle, angle) if fall_off else np.zeros(1)
     clear = (clearance(pictures, circle, angle) >= far) & steady(squared, shift, arc, far)
@@ -143,31 +156,52 @@ def calibrated_circle(
 ) -> np.ndarray:
     """Covariance of the three parameters by weighted least squares from dense points with correlated errors, unit^2.
 
-    Points weigh as the squared contrast over the noise's variance. ``kappa2``, (..., n) or one number, is a point's
-    variance over that of the noise at unit contrast, and errors d px apart correlate as exp(-d^2 / (4 scale^2)): to
-    second order, as along an edge, the variance is 2 sqrt(pi) scale times that of independent points a px, less
-    2 scale^2 at each end of a piece that is used; infinite where the pieces are so short that this would not be
-    positive. Disturbed points and those of a squared contrast below ``weakest`` times the noise's variance are left
-    out; a tenth of a turn must be left. ``shared``, (..., n, n), is what the points' errors have in common at unit
-    contrast (`imaging.row_noise.of_points`).
+    Points weigh as they count (`RimImage.share`) times the squared contrast over the noise's variance. ``kappa2``,
+    (..., n) or one number, is a point's variance over that of the noise at unit contrast, and errors d px apart
+    correlate as exp(-d^2 / (4 scale^2)): to second order, as along an edge, the variance is 2 sqrt(pi) scale times that
+    of independent points a px, less 2 scale^2 at each end of a piece that is used, and less where it begins by and by
+    (`_at_ends`); infinite where the pieces are so short that this would not be positive. Disturbed points and those of
+    a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of a turn must be left.
+    ``shared``, (..., n, n), is what the points' errors have in common at unit contrast (`imaging.row_noise.of_points`).
     """
-    taken = circle.clear | circle.crowded[..., None]
     ratio = circle.squared / circle.noise_variance
-    used = taken & (ratio >= weakest)
-    ends = (used & ~np.roll(used, 1, -1)).astype(int) + (used & ~np.roll(used, -1, -1))
-    information, along, at_ends = (
-        np.einsum("...n,...ni,...nj->...ij", np.where(used, weight * ratio, 0.0), circle.design, circle.design)
-        for weight in (circle.arc, kappa2 * circle.arc, kappa2 * ends)
+    share = np.where(ratio >= weakest, circle.share, 0.0)
+    information, along = (
+        np.einsum("...n,...ni,...nj->...ij", np.where(share > 0, weight * ratio, 0.0), circle.design, circle.design)
+        for weight in (share * circle.arc, kappa2 * share**2 * circle.arc)
     )
-    scatter = 2 * np.sqrt(np.pi) * scale * along - 2 * scale**2 * at_ends
-    inverse = _covariance(information, (circle.turn * used.mean(-1) >= LEAST_SEEN) & _positive(scatter))
+    error = np.sqrt(np.where(share > 0, kappa2 * ratio, 0.0))[..., None] * circle.design
+    scatter = 2 * np.sqrt(np.pi) * scale * along - 2 * scale**2 * _at_ends(share, error, circle.arc / scale)
+    enough = circle.turn * (share >= HALF).mean(-1) >= LEAST_SEEN
+    inverse = _covariance(information, enough & _positive(scatter))
     good = np.isfinite(inverse).all((-1, -2))[..., None, None]
     known = np.where(good, inverse, 0.0)
     if shared is not None:
-        pull = np.where(used, circle.arc * np.sqrt(circle.squared) / circle.noise_variance, 0.0)[..., None]
-        pull = pull * circle.design
+        pull = np.where(share > 0, share * circle.arc * np.sqrt(circle.squared) / circle.noise_variance, 0.0)
+        pull = pull[..., None] * circle.design
         scatter = scatter + np.einsum("...ni,...nm,...mj->...ij", pull, np.nan_to_num(shared), pull, optimize=True)
     return np.where(good, known @ scatter @ known, inverse)
+
+
+def _at_ends(share: np.ndarray, error: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    """What correlation lacks where points begin and cease to count, (..., p, p), for errors (..., n, p) of points.
+
+    A share w(x) that changes in steps d_k at places x_k has, for errors that correlate as exp(-u^2 / 4), a double
+    integral of 2 sqrt(pi) times that of w^2, less 2 sum d_k d_l f(x_k - x_l), f(u) = exp(-u^2 / 4) - sqrt(pi) u / 2
+    erfc(u / 2): 1 for each hard end, as good as nothing for one that is long. ``arc`` (..., n) is in smoothing scales.
+    """
+    rise = np.roll(share, -1, -1) - share
+    steps = rise[..., None] * np.where(rise[..., None] > 0, np.roll(error, -1, -2), error)
+    found = np.einsum("...ni,...nj->...ij", steps, steps)
+    if not ((share > 0) & (share < 1)).any():
+        return found
+    apart = np.broadcast_to(arc, share.shape)
+    for k in range(1, min(int(_FAR / max(apart.min(), 1e-300)), share.shape[-1] // 2) + 1):
+        half = k * apart / 2
+        joint = (np.exp(-(half**2)) - np.sqrt(np.pi) * half * erfc(half))[..., None] * steps
+        one = np.einsum("...ni,...nj->...ij", joint, np.roll(steps, -k, -2))
+        found = found + one + np.swapaxes(one, -1, -2)
+    return found
 
 
 def _positive(matrices: np.ndarray) -> np.ndarray:

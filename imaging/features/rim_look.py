@@ -34,11 +34,12 @@ _MOST_BEYOND = 64  # lines beyond each end of an arc
 _APART, _DIGITS = 0.6, 6  # standard deviations between lines around the rim at most, where not more than 11 a place
 _SHARP, _EVEN = 8, 0.02  # rays of an uneven cell, and the part of the brightest level by which it differs
 _STEPS, _CONVERGED = 8, 1e-12  # of Newton's method, and moves that are rounding, standard deviations
-_FARTHEST = 0.2  # px that a crossing may be moved: levels are known to a few percent, and so is the move
-_KNOWN = 0.05  # part of the brighter side that a contrast must have: levels so alike may be the other way round
-_STEEPER = 0.3  # by which the slope there may differ from a lone step's
-_ROUGH, _JUMP = 0.03, 0.2  # px of the shift, and part of the contrast, that neighbouring places may differ by
-_LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep another crossing in it may be
+# where a place counts by half (`_counted`):
+_FARTHEST = 0.2  # px that its crossing is moved: levels are known to a few percent, and so is the move
+_KNOWN = 0.05  # part of the brighter side that its contrast is: levels so alike may be the other way round
+_STEEPER = 0.3  # by which the slope there differs from a lone step's
+_ROUGH, _JUMP = 0.03, 0.2  # px of the shift, and part of the contrast, by which it differs from a neighbour
+_LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep another crossing in it is
 _AT = 1e-6  # of the way to the next place: there is the place itself
 _MOST = 12  # times `RIM_POINTS`
 _SPACING = 0.7  # smoothing scales between places, while there are not so many
@@ -59,8 +60,9 @@ class RimLook:
         Mean of both sides, grey levels^2.
     brightens : ndarray of bool, shape (n,)
         Whether it is brighter outside the rim.
-    good : ndarray of bool, shape (n,)
-        Where the shift can be trusted: the crossing is near, about as steep as a lone step's, and as its neighbours.
+    share : ndarray, shape (n,)
+        How much a place counts, 0 to 1: as much as its shift can be trusted. The crossing is near, about as steep as a
+        lone step's, and as its neighbours; each of it less and less, so that nothing jumps with the geometry.
     circle : Circle
         Whose angles they are.
     """
@@ -69,18 +71,20 @@ class RimLook:
     squared: np.ndarray
     noise_variance: np.ndarray
     brightens: np.ndarray
-    good: np.ndarray
+    share: np.ndarray
     circle: Circle
 
     def at(self, angle: np.ndarray) -> RimLook:
-        """The same at other angles (m,), between the places; good where both neighbours are."""
+        """The same at other angles (m,), between the places; nothing counts beside a place that does not."""
         count = self.shift.size
         place = self.circle.steps(angle, count)
         first, share = place.astype(int) % count, place - place.astype(int)
         then = (first + 1) % count
-        told = (v[first] + share * (v[then] - v[first]) for v in (self.shift, self.squared, self.noise_variance))
-        good = (self.good[first] | (share > 1 - _AT)) & (self.good[then] | (share < _AT))
-        return RimLook(*told, self.brightens[first], good, self.circle)
+        shift, squared, noise, counted = (
+            v[first] + share * (v[then] - v[first]) for v in (self.shift, self.squared, self.noise_variance, self.share)
+        )
+        known = ((self.share[first] > 0) | (share > 1 - _AT)) & ((self.share[then] > 0) | (share < _AT))
+        return RimLook(shift, squared, noise, self.brightens[first], np.where(known, counted, 0.0), self.circle)
 
 
 def places_around(pictures: Pictures, circle: Circle, spacing: float, most: int) -> int:
@@ -110,25 +114,30 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     noise = sensor.recorded(scene.noise, scene.noise.dark_level + sides).noise_variance
     moved = (crossing - alone) * width
     with np.errstate(divide="ignore", invalid="ignore"):
-        good = (np.abs(slope / (sides[1] - sides[0]) - 1) <= _STEEPER) & (np.abs(moved) <= _FARTHEST)
-    good &= np.abs(sides[1] - sides[0]) >= _KNOWN * sides.max(0)
-    good &= sides.max(0) <= sensor.headroom(scene.noise)
-    good &= _steepest(steps, where, crossing, slope, scene.locator.window_px / width)
-    good &= scene.camera.aperture_radius == 0  # of a cone of light the wall beside takes a part that is not known
-    shift, slope = np.where(good, moved, 0.0), np.where(good, slope, sides[1] - sides[0])
+        share = _counted(np.abs(slope / (sides[1] - sides[0]) - 1) / _STEEPER) * _counted(np.abs(moved) / _FARTHEST)
+        share *= _counted(_KNOWN * sides.max(0) / np.abs(sides[1] - sides[0]))
+        share *= _counted(_rival(steps, where, crossing, slope, scene.locator.window_px / width) / _RIVAL)
+    share[sides.max(0) > sensor.headroom(scene.noise)] = 0.0
+    share *= scene.camera.aperture_radius == 0  # of a cone of light the wall beside takes a part that is not known
+    shift, slope = np.where(share > 0, moved, 0.0), np.where(share > 0, slope, sides[1] - sides[0])
     noise = np.broadcast_to(noise, sides.shape).mean(0)
     squared = np.nan_to_num(slope) ** 2
-    return RimLook(shift, squared, noise, sides[1] > sides[0], good & _steady(moved, slope), circle)
+    return RimLook(shift, squared, noise, sides[1] > sides[0], share * _steady(moved, slope), circle)
+
+
+def _counted(excess: np.ndarray) -> np.ndarray:
+    """How much places count that are so much of a limit away from what is known well: 1 at 0, 0.5 at 1, 0 from 2 on."""
+    return np.cos(np.pi / 4 * np.clip(np.nan_to_num(excess, nan=2.0), 0, 2)) ** 2
 
 
 def _steady(shift: np.ndarray, contrast: np.ndarray) -> np.ndarray:
-    """Whether places (n,) are like both neighbours, so that what lies between them is."""
+    """How much places (n,) count by how like they are to both neighbours, so that what lies between them is."""
     size = np.abs(contrast)
     onward = np.roll(size, -1)
-    with np.errstate(invalid="ignore"):
-        alike = np.abs(np.roll(shift, -1) - shift) <= _ROUGH
-        alike &= np.abs(onward - size) <= _JUMP * np.maximum(onward, size)
-    return alike & np.roll(alike, 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alike = _counted(np.abs(np.roll(shift, -1) - shift) / _ROUGH)
+        alike *= _counted(np.abs(onward - size) / (_JUMP * np.maximum(onward, size)))
+    return np.minimum(alike, np.roll(alike, 1))
 
 
 def _normals(pictures: Pictures, circle: Circle, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -282,12 +291,12 @@ def _second(steps: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.nd
     return value, slope - bell.sum((1, 2))
 
 
-def _steepest(steps, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
-    """Whether no other crossing in the search window (n,) is nearly as steep, which noise would let win, (n,)."""
+def _rival(steps, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """How steep another crossing in the search window (n,), which noise may let win, is at most, over the slope."""
     places = np.linspace(-1, 1, _LOOKED)
     told = np.stack([_second(steps, where, place * window)[0] for place in places], 1) * np.sign(slope)[:, None]
     left, right = told[:, :-1], told[:, 1:]
     size = window * (places[1] - places[0])
     fall = np.where((left >= 0) & (right < 0), (left - right) / size[:, None], 0.0)
     others = np.abs((places[:-1] + places[1:]) / 2 * window[:, None] - crossing[:, None]) > size[:, None]
-    return (fall * others).max(1) <= _RIVAL * np.abs(slope)
+    return (fall * others).max(1) / np.abs(slope)

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from imaging.features.circles import LEAST_SEEN, RimImage, rim
+from imaging.features.circles import HALF, LEAST_SEEN, RimImage, rim
 from imaging.features.limb_outline import limb_outline, limb_places
 from imaging.features.limbs import limb_rim
 from imaging.features.locator import (
@@ -242,14 +242,14 @@ def _places(pictures: Pictures, each: Circle | Curved, image: RimImage) -> int:
 def _rim_errors(pictures: Pictures, image: RimImage) -> tuple[np.ndarray, np.ndarray]:
     """Which points of a rim are used, and their standard deviations along the radius, the scene's unit, (..., n)."""
     scene = pictures.scene
-    used = (image.clear | image.crowded[..., None]) & (image.squared >= CLEAREST**2 * image.noise_variance)
+    used = (image.share >= HALF) & (image.squared >= CLEAREST**2 * image.noise_variance)
     variance = kappa2(scene.locator.scale_px, image.blur) * image.noise_variance / image.squared
     return used, np.sqrt(variance) / np.abs(image.design[..., 2])
 
 
 def _is_lost(image: RimImage) -> np.ndarray:
     """Where too little of a rim is there, or too much of it without contrast, bool (...)."""
-    taken = image.clear | image.crowded[..., None]
+    taken = image.share >= HALF
     weak = taken & (image.squared >= MIN_CONTRAST**2 * image.noise_variance)
     used = taken & (image.squared >= CLEAREST**2 * image.noise_variance)
     few = image.turn * used.mean(-1) < LEAST_SEEN

@@ -273,18 +273,19 @@ def _of_rim(tool: RimTool, moved: np.ndarray, errors: np.ndarray, quantity: Quan
     """Of a circle or the limb of a ball, from what finds it, the errors (p,) at which that expects it, and those from
     there."""
     spacing = np.linalg.norm(np.diff(tool.places, axis=0), axis=-1) if len(tool.places) > 1 else np.ones(1)
-    pick = np.arange(len(tool.weights))[:: every(float(np.median(spacing)), tool.optics.scale_px)]
+    pick = tool.surest[:: every(float(np.median(spacing)), tool.optics.scale_px)]
     unit = 1 / tool.design[pick, 2]
     inward = (tool.inward - tool.beside(errors[None])[0] + tool.design @ moved)[pick]
     return FormTool(
         tool.locator, pick, inward, unit, tool.design[pick, :3] * unit[:, None],
-        tool.locator.positions[pick], _is_closed(tool), reference_of(quantity), tool.optics, tool.state,
+        tool.locator.positions[pick], _is_closed(tool.design[tool.surest]), reference_of(quantity), tool.optics,
+        tool.state,
     )  # fmt: skip
 
 
-def _is_closed(tool: RimTool) -> bool:
-    """Whether places go all the way around without a gap."""
-    angle = np.sort(np.arctan2(tool.design[:, 1], tool.design[:, 0]))
+def _is_closed(design: np.ndarray) -> bool:
+    """Whether places of designs (m, p) go all the way around without a gap."""
+    angle = np.sort(np.arctan2(design[:, 1], design[:, 0]))
     gaps = np.diff(angle, append=angle[0] + 2 * np.pi)
     return bool(gaps.max() < _GAP * np.median(gaps))
 

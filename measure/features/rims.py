@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import sparse
 
-from imaging.features.circles import LEAST_CLEAR, LEAST_SEEN
+from imaging.features.circles import HALF, LEAST_CLEAR, LEAST_SEEN
 from imaging.features.locator import MIN_CONTRAST, MOST_PLACES, SPACING, edge_blur, reach
 from imaging.features.rim_look import RimLook, look, places_around
 from imaging.features.rim_outline import facets, smooth_outline
@@ -202,8 +202,9 @@ def rim_tool(picture: Picture, name: str, moved: tuple[float, ...]) -> RimTool:
     told = None if seen is None else np.sqrt(seen.squared)[keep]
     signs = None if seen is None else np.where(seen.brightens, 1.0, -1.0)[keep]
     locator = gradient_along(optics, angle[keep], curve.places, curve.normals, curve.gain, signs=signs)
+    clear = None if seen is None or state != status.OK else seen.share[keep] >= HALF
     return RimTool(design[keep], weight[keep], inward[keep], state, optics, curve, told, locator=locator,
-                   places=curve.places)  # fmt: skip
+                   places=curve.places, clear=clear)  # fmt: skip
 
 
 def _places(pictures: Pictures, circle: Circle, optics: Optics) -> int:
@@ -242,13 +243,13 @@ def _weights(
         return np.zeros(shown.size), status.NOT_VISIBLE
     if seen is None:
         strong, weight = shown, arc
-        clear = clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.most_blur_px)
+        known = 1.0 * (clearance(pictures, circle, angle) >= reach(optics.scale_px, optics.most_blur_px))
     else:
         strong = shown & (seen.squared >= MIN_CONTRAST**2 * seen.noise_variance)
-        weight, clear = arc * seen.squared / seen.noise_variance, seen.good
+        weight, known = arc * seen.squared / seen.noise_variance, seen.share
         if turn * strong.mean() < LEAST_SEEN:
             return np.zeros(shown.size), status.LOW_CONTRAST
-    part = (strong & clear).mean()
+    part = (strong & (known >= HALF)).mean()
     if part < LEAST_CLEAR * max(strong.mean(), LEAST_CLEAR) or turn * part < LEAST_SEEN:
         return np.where(strong, weight, 0.0), status.CLUTTER
-    return np.where(strong & clear, weight, 0.0), status.OK
+    return np.where(strong, known * weight, 0.0), status.OK

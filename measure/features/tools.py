@@ -22,10 +22,18 @@ class RimTool(RimFit):
     locator : CrossingLocator
     places : ndarray, shape (m, 2)
         In the recorded image, px.
+    clear : ndarray of bool, shape (m,), optional
+        Which of them count by half at least, so that each by itself tells where the rim is; all where it is None.
     """
 
     locator: CrossingLocator
     places: np.ndarray
+    clear: np.ndarray | None = None
+
+    @property
+    def surest(self) -> np.ndarray:
+        """Numbers of the places that are clear."""
+        return np.arange(len(self.weights)) if self.clear is None else np.flatnonzero(self.clear)
 
     @cached_property
     def response(self) -> sparse.csr_array:

@@ -208,8 +208,7 @@ class Features:
 def _fit(seen: RimImage) -> np.ndarray:
     """Weighted least squares from offsets around a rim to its circle, (p, n); NaN where it is not found."""
     ratio = seen.squared / seen.noise_variance
-    used = (seen.clear | seen.crowded[..., None]) & (ratio >= MIN_CONTRAST**2)
-    weight = np.where(used, ratio * seen.arc, 0.0)
+    weight = np.where(ratio >= MIN_CONTRAST**2, seen.share * ratio * seen.arc, 0.0)
     size = np.sqrt(np.einsum("n,ni,ni->i", weight, seen.design, seen.design))
     if not (size > 0).all():
         return np.full((seen.design.shape[1], len(weight)), np.nan)

@@ -101,7 +101,7 @@ def as_if_whole(picture: Picture, arc: Circle) -> np.ndarray:
     across = np.einsum("ni,nij->nj", normal, slope)
     columns = [*(across @ axis for axis in arc.axes), (across * arc.spokes(angle)).sum(-1)]
     whole = replace(
-        own, design=np.stack(columns, -1), arc=speed * 2 * np.pi / _POINTS, clear=np.ones(_POINTS, bool),
+        own, design=np.stack(columns, -1), arc=speed * 2 * np.pi / _POINTS, known=np.ones(_POINTS),
         squared=np.full(_POINTS, own.squared[own.squared > 0].mean()), noise_variance=scene.noise.variance,
         turn=1.0, off_ends=None,
     )  # fmt: skip

@@ -123,22 +123,22 @@ def test_cells_that_are_looked_at_closely():
 
 
 def test_between_places_of_a_rim(rng):
-    """Linear, round the end too; good where both neighbours are, at a place itself where it is."""
+    """Linear, round the end too; a share where both neighbours have one, at a place itself as there."""
     count = 7
     circle = Circle("c1", np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, 0, (), True)
     known = RimLook(
         *rng.uniform(1, 5, (3, count)),
         np.arange(count) > 2,
-        np.array([True, True, False, True, True, True, False]),
+        np.array([1.0, 0.8, 0.0, 0.6, 1.0, 0.4, 0.0]),
         circle,
     )
     angles = (np.arange(count) + 0.5) * 2 * np.pi / count
     here = known.at(angles)
-    assert here.good.tolist() == known.good.tolist()
+    assert here.share == pytest.approx(known.share)
     for name in ("shift", "squared", "noise_variance"):
         assert getattr(here, name) == pytest.approx(getattr(known, name))
     between = known.at(angles + 0.3 * 2 * np.pi / count)
-    assert between.good.tolist() == [True, False, False, True, True, False, False]
+    assert between.share == pytest.approx([0.94, 0, 0, 0.72, 0.82, 0, 0])
     for name in ("shift", "squared", "noise_variance"):
         value = getattr(known, name)
         assert getattr(between, name) == pytest.approx(0.7 * value + 0.3 * np.roll(value, -1))

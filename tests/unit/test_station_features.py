@@ -39,7 +39,7 @@ def rim(rng, **parts):
     """Seven points of uneven arcs and contrasts, of which all are seen well, and three parameters."""
     made = {
         "design": rng.normal(size=(POINTS, 3)), "arc": rng.uniform(0.5, 2, POINTS),
-        "squared": rng.uniform(400, 900, POINTS), "noise_variance": 2.5, "clear": np.ones(POINTS, bool),
+        "squared": rng.uniform(400, 900, POINTS), "noise_variance": 2.5, "known": np.ones(POINTS),
     }  # fmt: skip
     return RimImage(**(made | parts))
 
@@ -57,7 +57,7 @@ def test_points_that_are_not_found_have_no_weight(rng, how):
     """Disturbed ones, and those below five sigma of contrast: 62.5 squared here."""
     seen = rim(rng)
     if how == "disturbed":
-        other = RimImage(**{**vars(seen), "clear": np.arange(POINTS) != 4})
+        other = RimImage(**{**vars(seen), "known": 1.0 * (np.arange(POINTS) != 4)})
     else:
         other = RimImage(**{**vars(seen), "squared": np.where(np.arange(POINTS) == 4, 62.4, seen.squared)})
     fit = _fit(other)
