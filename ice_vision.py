@@ -1,10 +1,14 @@
-"""Whether Python finds this project's packages by their names, and not what stands beside a script."""
+"""How this project's packages are found and loaded: by their names, not what stands beside a script, and when asked
+for."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 
 def check(beside: str, *names: str) -> None:
@@ -21,6 +25,20 @@ def check(beside: str, *names: str) -> None:
             raise ImportError(
                 f"{name} must be {package}, got {found}, which stands before it on Python's path: rename it"
             )
+
+
+def later(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """A package's ``__getattr__`` and ``__dir__``, for names that are loaded from their modules when asked for."""
+
+    def load(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(f"{package}.{homes[name]}"), name)
+
+    def names() -> list[str]:
+        return sorted({*vars(sys.modules[package]), *homes})
+
+    return load, names
 
 
 def _file(name: str) -> str | None:

@@ -4,8 +4,7 @@ import ice_vision
 
 ice_vision.check(__file__, "scenes", "imaging")
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from measure.best import best_estimator
 from measure.boards.charuco import charuco
@@ -50,17 +49,7 @@ _LATER = {
     "Bundled": "bundling", "bundle": "bundling",
 }  # fmt: skip
 
-
-def __getattr__(name: str) -> Any:
-    """What calibrates cameras and adjusts several pictures is loaded when asked for: it takes a second to load."""
-    if name in _LATER:
-        return getattr(import_module(f"measure.{_LATER[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_LATER})
-
+__getattr__, __dir__ = ice_vision.later(__name__, _LATER)  # calibrations and bundles take a second to load
 
 __all__ = [
     "ESTIMATORS",

@@ -4,8 +4,7 @@ import ice_vision
 
 ice_vision.check(__file__, "scenes", "imaging")
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from imaging.blurred.whole import image
 from imaging.features.measurand import required_edges
@@ -46,17 +45,7 @@ _LATER = {
     "InstallationBox": "certifying.installation", "installation_box": "certifying.installation",
 }  # fmt: skip
 
-
-def __getattr__(name: str) -> Any:
-    """Budgets, bundles and certificates are loaded when they are asked for: statistics take a third of a second."""
-    if name in _LATER:
-        return getattr(import_module(f"planner.{_LATER[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_LATER})
-
+__getattr__, __dir__ = ice_vision.later(__name__, _LATER)  # statistics take a third of a second to load
 
 __all__ = [
     "Aim",

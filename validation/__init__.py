@@ -26,13 +26,4 @@ def _drawn(found: Any) -> str:
 
 DRAW.append(_drawn)  # results show their pictures in notebooks, drawn when one asks for them
 
-
-def __getattr__(name: str) -> Any:
-    """Loaded when it is asked for: the command line answers before the renderer is there."""
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+__getattr__, __dir__ = ice_vision.later(__name__, _HOMES)  # the command line answers before the renderer is there
