@@ -1,5 +1,7 @@
 """Random rays against Mitsuba's own integrators where their numbers are shared, and against closed forms anywhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,11 +78,12 @@ def beside_the_corner(task1, material=MATT, **updates):
     return task1.model_copy(update={"material": material, "camera": camera, **updates})
 
 
-def level_of_the_face(scene, light, effects):
-    """Mean grey level above darkness of 36 px on the face x = 0, with its standard error over four seeds."""
-    images = [render.image(scene, (60, 170), light, Quality(4, 16, 16, 64, seed), effects=effects) for seed in range(4)]
+def level_of_the_face(scene, light, effects, quality=Quality(4, 16, 16, 64), count=4):
+    """Mean grey level above darkness of 36 px on the face x = 0, with its standard error over so many seeds."""
+    qualities = [replace(quality, seed=seed) for seed in range(count)]
+    images = [render.image(scene, (60, 170), light, each, effects=effects) for each in qualities]
     means = np.array([image[:6, :6].mean() - scene.noise.dark_level for image in images])
-    return means.mean(), means.std(ddof=1) / 2
+    return means.mean(), means.std(ddof=1) / np.sqrt(count)
 
 
 @pytest.mark.parametrize("above", [5.0, 1.0, -2.0])
@@ -124,6 +127,17 @@ def test_light_from_the_floor(task1):
     # margin: 4 standard errors of the rays, and 1 %
     assert found == pytest.approx(expected, abs=4 * error + 0.01 * expected)
     assert level_of_the_face(scene, (0, 0), active)[0] == pytest.approx(0, abs=0.01 * expected)  # negative control
+
+
+def test_few_rays_lose_no_light_between_faces(task1):
+    """Of a bright wall before a bright floor: four rays show on the mean what 64 do, which agree with closed forms."""
+    bright = scenes.Material(specular_fraction=0.0, diffuse_reflectance=0.9)
+    scene = beside_the_corner(task1, bright, floor=Floor(reflectance=0.8))
+    active = FREE | {"floor", "interreflection"}
+    many, _ = level_of_the_face(scene, (0, 0), active, Quality(1, 4, 4, 64), 16)
+    few, error = level_of_the_face(scene, (0, 0), active, Quality(1, 4, 4, 4), 48)
+    assert few == pytest.approx(many, rel=0.05)
+    assert error < 0.01 * many  # negative control: chance hides no twentieth
 
 
 def test_an_edge_out_of_focus(task1):
