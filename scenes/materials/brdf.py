@@ -83,7 +83,8 @@ class Brdf(Model):
         return self
 
     def dimmed(self, part: float) -> Self | None:
-        """The same reflecting less by a part, 0 to 1, in all directions; None of a kind that does not say how."""
+        """The same reflecting less by a part, at most 1, in all directions, more where it is negative, be it more than
+        can be; None of a kind that does not say how."""
         return None
 
     def indices(self, curves: Curves = ()) -> tuple[Index, ...]:

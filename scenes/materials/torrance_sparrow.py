@@ -95,7 +95,7 @@ class Material(Brdf):
         """
         specular = (1 - part) * self.specular_fraction
         lambertian = (1 - part) * self.lambertian
-        diffuse = lambertian / (1 - specular) if specular < 1 else self.diffuse_reflectance
+        diffuse = lambertian / (1 - specular) if specular != 1 else self.diffuse_reflectance
         return self.tried(specular_fraction=specular, diffuse_reflectance=diffuse)
 
     def indices(self, curves: Curves = ()) -> tuple[Index, ...]:

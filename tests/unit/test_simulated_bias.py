@@ -250,7 +250,7 @@ def _angle(one: Pose, other: Pose) -> float:
     return math.asin(np.linalg.norm(np.cross(*ways)))
 
 
-def test_each_surface_reflects_less_by_a_tenth():
+def test_each_surface_reflects_less_by_a_tenth_or_more():
     """One at a time: the part, the floor, and a face's own material."""
     scene = scenes.load("grey_floor").with_(uncertainty={"reflectance": 0.1})
     own = {"kind": "torrance_sparrow", "name": "matt", "where": "top", "diffuse_reflectance": 0.3}
@@ -260,8 +260,10 @@ def test_each_surface_reflects_less_by_a_tenth():
     def reflected(each):
         return each.material.specular_fraction, each.floor.reflectance, each.materials[0].diffuse_reflectance
 
-    found = [np.divide(reflected(each.scene), reflected(scene)) for each in inputs.of_other_surfaces(picture)]
-    assert np.array(found) == pytest.approx(np.array([[0.9, 1, 1], [1, 0.9, 1], [1, 1, 0.9]]))
+    for times, part in ((1.0, 0.9), (-1.0, 1.1)):
+        others = inputs.of_other_surfaces(picture, times)
+        found = [np.divide(reflected(each.scene), reflected(scene)) for each in others]
+        assert np.array(found) == pytest.approx(np.array([[part, 1, 1], [1, part, 1], [1, 1, part]]))
     assert scene.floor.reflectance == 0.2
 
 
@@ -442,8 +444,8 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
 def test_what_is_compared_is_rendered_once(monkeypatch, below):
     """The part as it is, and each of three steps of the light's place: four images, none twice.
 
-    Below a megapixel with all light, and one more where it reflects less; else direct light alone, whose rest in the
-    render is what surfaces send to each other.
+    Below a megapixel with all light, and two more where it reflects less and more; else direct light alone, whose rest
+    in the render is what surfaces send to each other.
     """
     scene, asked = scenes.load("bracket"), []
 
@@ -456,14 +458,37 @@ def test_what_is_compared_is_rendered_once(monkeypatch, below):
     monkeypatch.setattr(imagery, "LARGE", 1 << 20 if below else 1)
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
     images = imagery.completed(picture, (np.full((2, 2), 77.0),), (), How())
-    assert [each[1:] for each in asked] == [(True, below)] * (4 + below)
+    assert [each[1:] for each in asked] == [(True, below)] * (4 + 2 * below)
     assert [shown is picture for shown, *_ in asked].count(True) == 1
-    assert len({shown for shown, *_ in asked}) == 4 + below
-    dark, here, first = scene.noise.dark_level, 52 if below else 51, 3 if below else 2
+    assert len({shown for shown, *_ in asked}) == 4 + 2 * below
+    dark, here, first = scene.noise.dark_level, 52 if below else 51, 4 if below else 2
     levels = [dark + (77 - dark) * (50 + k - dark) / (here - dark) for k in (1, *range(first, first + 3))]
-    reflected = [levels[0]] if below else [77 - 51]
+    more = dark + (77 - dark) * (53 - dark) / (here - dark)
+    reflected = [77 + (levels[0] - more) / 2] if below else [77 - 51]
     assert [each.flat[0] for each in images.changed["reflectance"]] == pytest.approx(reflected, rel=1e-12)
     assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(levels[1:], rel=1e-12)
+
+
+@pytest.mark.parametrize("overall", [False, True])
+def test_a_reflectance_does_what_it_does_on_both_sides(monkeypatch, overall):
+    """Light that goes to and fro between two faces, r / (1 - r) of the direct: its derivative by what is reflected, not
+    what a step less does, which is a tenth smaller; as images beside edges have it, and those of the whole picture."""
+    scene, r = scenes.load("bracket").with_(uncertainty={"reflectance": 0.1}), 0.5
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+
+    def rendered(how, shown, effects, seed):
+        part = shown.scene.material.lambertian / scene.material.lambertian
+        return scene.noise.dark_level + 100.0 * part * np.array([[1.0, 1.0 / (1.0 - part * r)]])
+
+    monkeypatch.setattr(How, "_rendered", rendered)
+    images = imagery.completed(picture, (How().image(picture),), (), How())
+    pair = (
+        imagery.of_all(picture, images, How())[0, 1:3] if overall else (*images.renders, *images.changed["reflectance"])
+    )
+    by_part = (pair[0] - pair[1])[0] / (100.0 * scene.uncertainty.reflectance.u)
+    assert by_part == pytest.approx([1.0, 1 / (1 - r) ** 2], rel=0.02)
+    one_sided = (pair[0] - rendered(None, next(inputs.of_other_surfaces(picture)), None, 0))[0]
+    assert one_sided[1] < 0.95 * (pair[0] - pair[1])[0, 1]  # negative control
 
 
 def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
@@ -474,13 +499,15 @@ def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
 
     def rendered(how, shown, effects, seed):
         seeds.append(how.quality.seed + seed)
-        return np.full((2, 2), dark + (50.0 if shown is picture else 51.0 + (how.quality.seed + seed - 7) ** 2))
+        brighter = shown.scene.material.lambertian > scene.material.lambertian
+        step = (-1.0 if brighter else 1.0) * (1 + (how.quality.seed + seed - 7) ** 2)
+        return np.full((2, 2), dark + 50.0 + (0.0 if shown is picture else step))
 
     monkeypatch.setattr(How, "_rendered", rendered)
     how = How(quality=Quality(seed=7))
     images = imagery.completed(picture, (np.full((2, 2), dark + 100.0),), (), how)
     settled = imagery.settled(picture, images, how)
-    assert sorted(seeds) == sorted(5 * [7, 8, 9, 10])
+    assert sorted(seeds) == sorted(6 * [7, 8, 9, 10])
     assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 1, "light_place": 3}
     for some, first in zip(settled.changed.values(), images.changed.values(), strict=True):
         for settled_one, first_one in zip(some, first, strict=True):

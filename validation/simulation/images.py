@@ -1,11 +1,12 @@
 """Images, beside renders of a picture, of what its scene is not sure of.
 
-Reflectances change what light does between faces, and contrasts: each is rendered reflecting less, with few rays, and
-subtracted from the same render of the scene as it is. In images above a megapixel, where that takes long, what one
-material does is told by the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered
-so, too, in large images their direct light alone; of plain scenes the closed form of the bias tells what lights do. Two
-renders that are compared have the same rays, one by one, or their difference would be noise; and what makes a picture
-brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
+Reflectances change what light does between faces, and contrasts: each is rendered reflecting less and, up to a
+megapixel, more, with few rays, and half of one subtracted from the other, for between faces that light each other a
+step more does more than one less. In images above a megapixel, where that takes long, what one material does is told by
+the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered so, too, in large images
+their direct light alone; of plain scenes the closed form of the bias tells what lights do. Renders that are compared
+have the same rays, one by one, or their difference would be noise; and what makes a picture brighter or darker as a
+whole, which moves nothing, is not told by few rays but by the render itself.
 """
 
 from __future__ import annotations
@@ -52,6 +53,9 @@ def completed(
         dimmed = of_one_surface(picture, renders, partial(direct, picture), u_of(picture.scene.uncertainty.reflectance))
     if dimmed is None:
         others = _steps(first, whole, of_other_surfaces(picture), picture)
+        if is_below(picture, LARGE):
+            brighter = _steps(first, whole, of_other_surfaces(picture, -1.0), picture)
+            others = tuple(first + (less - more) / 2 for less, more in zip(others, brighter, strict=True))
     changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
     in_closed_form = light_in_closed_form(picture, how)
     if in_closed_form is not None:
@@ -68,11 +72,14 @@ def completed(
 def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
     """Images of all of a picture, as `measure.Images` has them, with what others of it have changed."""
     how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
-    changed = *of_other_surfaces(picture), *(with_lights_moved(picture) if LIGHT in images.changed else ())
+    surfaces = zip(of_other_surfaces(picture), of_other_surfaces(picture, -1.0), strict=True)
+    surfaces, lights = tuple(surfaces), tuple(with_lights_moved(picture) if LIGHT in images.changed else ())
     for seed in range(2):
         alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
         levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
-        sets.append([levels.image(picture, seed), *map(alike.image, (picture, *changed))])
+        here = alike.image(picture)
+        steps = (here + (alike.image(less) - alike.image(more)) / 2 for less, more in surfaces)
+        sets.append([levels.image(picture, seed), here, *steps, *map(alike.image, lights)])
     return np.array(sets)
 
 

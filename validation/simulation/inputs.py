@@ -20,12 +20,18 @@ from validation.simulation.how import How
 REFLECTANCE, LIGHT = "reflectance", "light_place"
 
 
-def of_other_surfaces(picture: Picture) -> Iterator[Picture]:
+def of_other_surfaces(picture: Picture, times: float = 1.0) -> Iterator[Picture]:
     """The picture with each material, and the floor, reflecting less by its standard uncertainty.
 
     One material of one convex body is not among them: it changes nothing but the scale of brightness.
+
+    Parameters
+    ----------
+    picture : Picture
+    times : float
+        Of the standard uncertainty; negative: reflecting more, be it more than all.
     """
-    scene, part = picture.scene, u_of(picture.scene.uncertainty.reflectance)
+    scene, part = picture.scene, times * u_of(picture.scene.uncertainty.reflectance)
     if part == 0 or (is_plain(scene) and not scene.materials):
         return
     dimmed = scene.material.dimmed(part)
