@@ -464,7 +464,7 @@ def test_what_is_compared_is_rendered_once(monkeypatch, below):
     dark, here, first = scene.noise.dark_level, 52 if below else 51, 4 if below else 2
     levels = [dark + (77 - dark) * (50 + k - dark) / (here - dark) for k in (1, *range(first, first + 3))]
     more = dark + (77 - dark) * (53 - dark) / (here - dark)
-    reflected = [77 + (levels[0] - more) / 2] if below else [77 - 51]
+    reflected = [77 + (levels[0] - more) / 2, (levels[0] + more) / 2] if below else [77 - 51]
     assert [each.flat[0] for each in images.changed["reflectance"]] == pytest.approx(reflected, rel=1e-12)
     assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(levels[1:], rel=1e-12)
 
@@ -482,13 +482,15 @@ def test_a_reflectance_does_what_it_does_on_both_sides(monkeypatch, overall):
 
     monkeypatch.setattr(How, "_rendered", rendered)
     images = imagery.completed(picture, (How().image(picture),), (), How())
-    pair = (
-        imagery.of_all(picture, images, How())[0, 1:3] if overall else (*images.renders, *images.changed["reflectance"])
-    )
-    by_part = (pair[0] - pair[1])[0] / (100.0 * scene.uncertainty.reflectance.u)
+    beside = *images.renders, *images.changed["reflectance"]
+    here, straight, bent = imagery.of_all(picture, images, How())[0, 1:4] if overall else beside
+    u = scene.uncertainty.reflectance.u
+    by_part = (here - straight)[0] / (100.0 * u)
     assert by_part == pytest.approx([1.0, 1 / (1 - r) ** 2], rel=0.02)
-    one_sided = (pair[0] - rendered(None, next(inputs.of_other_surfaces(picture)), None, 0))[0]
-    assert one_sided[1] < 0.95 * (pair[0] - pair[1])[0, 1]  # negative control
+    off = 0.0 if overall else r / (1 - r) ** 3 * u**2  # half its second derivative
+    assert (bent - here)[0] / 100.0 == pytest.approx([0.0, off], rel=0.03, abs=1e-12)
+    one_sided = (here - rendered(None, next(inputs.of_other_surfaces(picture)), None, 0))[0]
+    assert one_sided[1] < 0.95 * (here - straight)[0, 1]  # negative control
 
 
 def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
@@ -508,9 +510,10 @@ def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
     images = imagery.completed(picture, (np.full((2, 2), dark + 100.0),), (), how)
     settled = imagery.settled(picture, images, how)
     assert sorted(seeds) == sorted(6 * [7, 8, 9, 10])
-    assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 1, "light_place": 3}
-    for some, first in zip(settled.changed.values(), images.changed.values(), strict=True):
-        for settled_one, first_one in zip(some, first, strict=True):
+    assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 2, "light_place": 3}
+    for name, some in settled.changed.items():
+        straight = slice(0, 1) if name == "reflectance" else slice(None)  # and one that is bent, of which nothing is
+        for settled_one, first_one in zip(some[straight], images.changed[name][straight], strict=True):
             assert first_one == pytest.approx(np.full((2, 2), dark + 102.0), rel=1e-12)
             assert settled_one == pytest.approx(np.full((2, 2), dark + 102.0 + 2 * (0 + 1 + 4 + 9) / 4), rel=1e-12)
     assert settled.renders is images.renders

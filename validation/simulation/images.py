@@ -2,11 +2,12 @@
 
 Reflectances change what light does between faces, and contrasts: each is rendered reflecting less and, up to a
 megapixel, more, with few rays, and half of one subtracted from the other, for between faces that light each other a
-step more does more than one less. In images above a megapixel, where that takes long, what one material does is told by
-the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered so, too, in large images
-their direct light alone; of plain scenes the closed form of the bias tells what lights do. Renders that are compared
-have the same rays, one by one, or their difference would be noise; and what makes a picture brighter or darker as a
-whole, which moves nothing, is not told by few rays but by the render itself.
+step more does more than one less. By how much both lie off the straight line counts as an input of its own: an error's
+square is one on the mean, in standard uncertainties. In images above a megapixel, where that takes long, what one
+material does is told by the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered
+so, too, in large images their direct light alone; of plain scenes the closed form of the bias tells what lights do.
+Renders that are compared have the same rays, one by one, or their difference would be noise; and what makes a picture
+brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
 """
 
 from __future__ import annotations
@@ -55,7 +56,11 @@ def completed(
         others = _steps(first, whole, of_other_surfaces(picture), picture)
         if is_below(picture, LARGE):
             brighter = _steps(first, whole, of_other_surfaces(picture, -1.0), picture)
-            others = tuple(first + (less - more) / 2 for less, more in zip(others, brighter, strict=True))
+            others = tuple(
+                image
+                for less, more in zip(others, brighter, strict=True)
+                for image in (first + (less - more) / 2, (less + more) / 2)
+            )
     changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
     in_closed_form = light_in_closed_form(picture, how)
     if in_closed_form is not None:
@@ -79,7 +84,8 @@ def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
         levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
         here = alike.image(picture)
         steps = (here + (alike.image(less) - alike.image(more)) / 2 for less, more in surfaces)
-        sets.append([levels.image(picture, seed), here, *steps, *map(alike.image, lights)])
+        told = (image for step in steps for image in (step, here))  # of what is bent no block is asked
+        sets.append([levels.image(picture, seed), here, *told, *map(alike.image, lights)])
     return np.array(sets)
 
 
