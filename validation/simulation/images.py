@@ -5,13 +5,15 @@ megapixel, more, with few rays, and half of one subtracted from the other, for b
 step more does more than one less. By how much both lie off the straight line counts as an input of its own: an error's
 square is one on the mean, in standard uncertainties. In images above a megapixel, where that takes long, what one
 material does is told by the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered
-so, too, in large images their direct light alone; of plain scenes the closed form of the bias tells what lights do.
+so, too, both ways and as far as they may stand, for a shadow may reach an edge from there alone; in large images their
+direct light. Of plain scenes the closed form of the bias tells what lights do.
 Renders that are compared have the same rays, one by one, or their difference would be noise; and what makes a picture
 brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache, partial
@@ -35,6 +37,7 @@ from validation.simulation.inputs import (
     with_lights_moved,
 )
 
+_LIMIT = math.sqrt(3.0)  # standard deviations: the end of a uniform distribution, where a shadow may reach an edge
 _SETS = 4  # of rays that tell what changes a bias that is not known well enough
 _OVERALL = {"supersample": 1, "samples": 1, "edge_samples": 4, "random_samples": 16}
 _LEVELS = 64  # random samples of the image that a picture is compared with
@@ -52,16 +55,12 @@ def completed(
     direct, whole, dimmed = cache(partial(alike.direct, active=active)), cache(alike.image), None
     if active & MANY_WAYS == {BETWEEN} and not is_below(picture, LARGE):
         dimmed = of_one_surface(picture, renders, partial(direct, picture), u_of(picture.scene.uncertainty.reflectance))
-    if dimmed is None:
-        others = _steps(first, whole, of_other_surfaces(picture), picture)
-        if is_below(picture, LARGE):
-            brighter = _steps(first, whole, of_other_surfaces(picture, -1.0), picture)
-            others = tuple(
-                image
-                for less, more in zip(others, brighter, strict=True)
-                for image in (first + (less - more) / 2, (less + more) / 2)
-            )
-    changed = {REFLECTANCE: others if dimmed is None else (dimmed,)}
+    if dimmed is not None:
+        changed = {REFLECTANCE: (dimmed,)}
+    elif is_below(picture, LARGE):
+        changed = {REFLECTANCE: _both_ways(first, whole, of_other_surfaces, picture)}
+    else:
+        changed = {REFLECTANCE: _steps(first, whole, of_other_surfaces(picture), picture)}
     in_closed_form = light_in_closed_form(picture, how)
     if in_closed_form is not None:
         known |= {LIGHT: in_closed_form}
@@ -69,7 +68,7 @@ def completed(
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
         made = whole if is_below(picture, LARGE) else direct
-        changed[LIGHT] = _steps(first, made, with_lights_moved(picture), picture)
+        changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
     changed = {name: some for name, some in changed.items() if some}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
 
@@ -77,15 +76,15 @@ def completed(
 def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
     """Images of all of a picture, as `measure.Images` has them, with what others of it have changed."""
     how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
-    surfaces = zip(of_other_surfaces(picture), of_other_surfaces(picture, -1.0), strict=True)
-    surfaces, lights = tuple(surfaces), tuple(with_lights_moved(picture) if LIGHT in images.changed else ())
+    pairs = [(pair, 1.0) for pair in _pairs(of_other_surfaces, picture)]
+    pairs += [(pair, _LIMIT) for pair in _pairs(with_lights_moved, picture, _LIMIT) if LIGHT in images.changed]
     for seed in range(2):
         alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
         levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
         here = alike.image(picture)
-        steps = (here + (alike.image(less) - alike.image(more)) / 2 for less, more in surfaces)
+        steps = (here + (alike.image(one) - alike.image(other)) / (2 * times) for (one, other), times in pairs)
         told = (image for step in steps for image in (step, here))  # of what is bent no block is asked
-        sets.append([levels.image(picture, seed), here, *told, *map(alike.image, lights)])
+        sets.append([levels.image(picture, seed), here, *told])
     return np.array(sets)
 
 
@@ -110,6 +109,28 @@ def rebased(images: Images, renders: tuple[np.ndarray, ...]) -> Images:
         name: tuple(renders[0] + (each - images.renders[0]) for each in some) for name, some in images.changed.items()
     }
     return replace(images, renders=renders, changed=moved)
+
+
+def _pairs(others: Callable[[Picture, float], Iterable[Picture]], picture: Picture, times: float = 1.0) -> Iterable:
+    """What an input moved by so many standard uncertainties makes of a picture, and the other way."""
+    return zip(others(picture, times), others(picture, -times), strict=True)
+
+
+def _both_ways(
+    first: np.ndarray,
+    made: Callable[[Picture], np.ndarray],
+    others: Callable[[Picture, float], Iterable[Picture]],
+    picture: Picture,
+    times: float = 1.0,
+) -> tuple[np.ndarray, ...]:
+    """For each input the first render with what it does on the straight line, and with what both ways lie off it."""
+    ways = [each for pair in _pairs(others, picture, times) for each in pair]
+    seen = iter(_steps(first, made, ways, picture))
+    return tuple(
+        first + part / (2 * times)
+        for one, other in zip(seen, seen, strict=True)
+        for part in (one - other, one + other - 2 * first)
+    )
 
 
 def _steps(

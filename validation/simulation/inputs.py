@@ -56,14 +56,14 @@ def of_unknown_kinds(picture: Picture) -> dict[str, tuple[np.ndarray, np.ndarray
     return {REFLECTANCE: (unknown, unknown)}
 
 
-def with_lights_moved(picture: Picture) -> Iterator[Picture]:
-    """The picture with each light moved by its standard uncertainty: away, along the meridian, and across it."""
-    u = u_of(picture.scene.uncertainty.light_place)
+def with_lights_moved(picture: Picture, times: float = 1.0) -> Iterator[Picture]:
+    """The picture with each light moved by so many standard uncertainties: away, along the meridian, and across it."""
+    step = times * u_of(picture.scene.uncertainty.light_place)
     for i, light in enumerate(picture.scene.lights):
-        if light.faces_sensor or u == 0:
+        if light.faces_sensor or step == 0:
             continue
-        yield picture.with_scene(_with_light(picture.scene, i, light.tried(distance=(1 + u) * light.distance)))
-        for pose in _beside(picture.lights[i], math.degrees(u)):
+        yield picture.with_scene(_with_light(picture.scene, i, light.tried(distance=(1 + step) * light.distance)))
+        for pose in _beside(picture.lights[i], step):
             yield replace(picture, lights=(*picture.lights[:i], pose, *picture.lights[i + 1 :]))
 
 
@@ -75,12 +75,13 @@ def _with_light(scene: Scene, which: int, light) -> Scene:
 
 
 def _beside(pose: Pose, step: float) -> Iterator[Pose]:
-    """Poses a step away, degrees, along the meridian and across it."""
-    yield Pose(pose.polar_deg + step if pose.polar_deg + step <= 180 else pose.polar_deg - step, pose.azimuth_deg)
-    (p, a), s = np.radians(list(pose)), math.radians(step)
+    """Poses a step away, radians, along the meridian and across it."""
+    p, a = np.radians(list(pose))
     here = np.array([math.sin(p) * math.cos(a), math.sin(p) * math.sin(a), math.cos(p)])
-    x, y, z = math.cos(s) * here + math.sin(s) * np.array([-math.sin(a), math.cos(a), 0.0])
-    yield Pose(math.degrees(math.atan2(math.hypot(x, y), z)), math.degrees(math.atan2(y, x)))
+    down = np.array([math.cos(p) * math.cos(a), math.cos(p) * math.sin(a), -math.sin(p)])
+    for way in (down, np.array([-math.sin(a), math.cos(a), 0.0])):
+        x, y, z = math.cos(step) * here + math.sin(step) * way
+        yield Pose(math.degrees(math.atan2(math.hypot(x, y), z)), math.degrees(math.atan2(y, x)))
 
 
 def light_in_closed_form(picture: Picture, how: How) -> tuple[np.ndarray, np.ndarray] | None:
