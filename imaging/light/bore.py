@@ -53,8 +53,8 @@ def bores(solid: Solid) -> tuple[Bore, ...]:
             aside = float(np.linalg.norm(away + length * rim.axis))
             unlike = max(aside, abs(rim.radius - other.radius)) > _ALIKE * rim.radius
             facing = rim.hole and other.hole and length > 0 and rim.axis @ other.axis < _ALIKE - 1
-            if facing and not unlike:
-                found += [bore for bore in (_bore(solid, rim, other, length),) if _is_wall(solid, bore)]
+            if facing and not unlike and _is_wall(solid, bore := _bore(solid, rim, other, length)):
+                found.append(bore)
     return tuple(found)
 
 
