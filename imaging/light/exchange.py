@@ -358,7 +358,8 @@ def exchange_of(
     coordinates = _placed(places.points, places.normals, scale)
     of_patch = _PLACES if roughly else 1
     tree = KDTree(coordinates[of_patch // 2 :: of_patch])
-    return Exchange(solid, some, cell, scale, places, tree.query(coordinates)[1], tree, floor, roughly, rims)
+    patches = tree.query(coordinates)[1] if roughly else np.arange(tree.n)
+    return Exchange(solid, some, cell, scale, places, patches, tree, floor, roughly, rims)
 
 
 def _seeing(bodies: Solid, floor: Floor | None) -> np.ndarray:
