@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes import Circle, Scene
+from scenes import Circle, Scene, Solid
 
 _AROUND, _DENSEST = 32, 4.0  # nodes of a ring at least, and nodes a cell where the rim is larger
 _RINGS = np.array([0.0, 0.2, 1.0])  # of the width
@@ -31,18 +31,23 @@ class Annulus:
         Scene units.
     count : int
         Nodes of a ring.
+    outwards : int
+        1 where the face lies about the rim, as at a hole's mouth and a pin's foot; -1 where it lies within it, as at a
+        hole's ground and a pin's top.
     """
 
     circle: Circle
     width: float
     count: int
+    outwards: int
 
     @classmethod
-    def beside(cls, circle: Circle, cell: float) -> Annulus:
+    def beside(cls, solid: Solid, circle: Circle, cell: float) -> Annulus:
         """As wide and as dense as a rim needs on a face that is told in cells of some side."""
         length = circle.turn * circle.radius
         count = max(_AROUND * circle.turn / (2 * np.pi), _DENSEST * length / cell)
-        return cls(circle, min(_WIDE * circle.radius, cell), max(4, int(np.ceil(count))))
+        outwards = 1 if circle.hole == solid.edge(circle.edges[0]).convex else -1
+        return cls(circle, min(_WIDE * circle.radius, cell), max(4, int(np.ceil(count))), outwards)
 
     @property
     def closed(self) -> bool:
@@ -62,7 +67,7 @@ class Annulus:
     def nodes(self) -> np.ndarray:
         """Around the rim, then from ring to ring, (n, 3); none is on the rim, where light comes from both sides."""
         spokes = self.circle.spokes(self.circle.angles(self.count))
-        away = self._outwards * np.maximum(self.rings, _WITHIN * self.width)
+        away = self.outwards * np.maximum(self.rings, _WITHIN * self.width)
         return self.circle.centre + ((self.circle.radius + away)[:, None] * spokes[:, None]).reshape(-1, 3)
 
     def coordinates(self, points: np.ndarray) -> np.ndarray:
@@ -80,11 +85,6 @@ class Annulus:
         beyond = (np.abs(turned) / self.circle.turn - 0.5) * self.count  # steps beyond its ends
         return found * np.clip(1 - beyond, 0, 1)
 
-    @property
-    def _outwards(self) -> float:
-        """1 where the face lies about the rim, as of a hole; -1 where it lies within it."""
-        return 1.0 if self.circle.hole else -1.0
-
     def _angle(self, points: np.ndarray) -> np.ndarray:
         one, two = self.circle.axes
         return np.arctan2((points - self.circle.centre) @ two, (points - self.circle.centre) @ one)
@@ -92,7 +92,7 @@ class Annulus:
     def _away(self, points: np.ndarray) -> np.ndarray:
         """Distance of points (n, 3) from the rim, positive on the face."""
         across = np.linalg.norm(points - self.circle.centre, axis=-1)
-        return self._outwards * (across - self.circle.radius)
+        return self.outwards * (across - self.circle.radius)
 
 
 def measured_rims(scene: Scene) -> tuple[Circle, ...]:

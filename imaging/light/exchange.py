@@ -1,11 +1,12 @@
 """Light that faces send to each other, by radiosity: of an inner edge, a step, a pocket, an obstacle, the floor.
 
 Faces on the convex hull of all bodies see no other, but the floor where they do not look up, and walls of round through
-holes have a closed form (`imaging.light.bore`). The others, however many, have places spread evenly over them, and
-patches, which are places near to each other that look the same way, so that facets of a fillet share one. Rays tell
-once for a solid which share of what a patch sees is each other one; the patches exchange light by it. What arrives on a
-face is gathered when it is asked for, by rays from nodes of it: what they meet sends its share of the light that falls
-there, and of what its patch has from the others.
+holes have a closed form (`imaging.light.bore`). The others, however many, have places spread evenly over them, each
+of which stands for a patch: what is nearer to it than to others and looks the same way, so that facets of a fillet
+share one. Where light is told roughly, a patch is that of many places. Rays tell once for a solid which share of what a
+patch sees is each other one; the patches exchange light by it. What arrives on a face is gathered when it is asked for,
+by rays from nodes of it: what they meet sends its share of the light that falls there, and of what its patch has from
+the others.
 
 Rays follow Lambert's cosine and a low-discrepancy sequence: a share is off by about their number to the power -0.75,
 and all shares of a place add to 1.
@@ -33,21 +34,23 @@ from scenes.parts.solid import assembled
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline
+    from scipy.sparse import csr_matrix
     from scipy.spatial import KDTree
 
-_PATCHES = 400  # of the whole body
-_RIM_PATCHES, _RIM_SCALE = 400, 0.5  # beside measured rims, and cells that count as one between patches there
-_PLACES, _RAYS = 15, 32  # of a patch, about, and from each of them; an odd number, or some are midway between two
+_CELLS = 400  # of the whole body
+_RIM_CELLS, _RIM_SCALE = 400, 0.5  # as many places more beside measured rims, and cells that count as one there
+_PLACES, _RAYS = 15, 32  # of a cell, about, and from each of them; an odd number, or some are midway between two
 _LIT = 4  # times as many places tell what falls on patches where rims are measured: through a hole it is a small spot
 _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
-_ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly
+_BOUNCES, _LEFT = 200, 1e-9  # at most, and part of the light that is left after the last one
+_ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly, by patches of a cell
 _ROUGH_PATCHES = 4  # about a small face, whose light is then a mean of theirs
 _REFLECTED = 128  # rays of a place that is asked what lit faces it sees
-_CELLS = 160  # of the whole body; nodes on a face that is asked for stand so dense
+_NODES = 160  # of the whole body; nodes on a face that is asked for stand so dense
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
 _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; beyond it is like the nearest of them
-_FLOOR_PATCHES = 400  # of it, besides those of the bodies
+_FLOOR_CELLS = 400  # of it, besides those of the bodies
 _UP = 1 - 1e-9  # cosine of a normal that sees no floor
 _AT_ONCE = 200_000  # rays
 _TOGETHER = 64  # faces
@@ -79,18 +82,18 @@ class Exchange:
     faces : ndarray of int
         Those faces.
     cell : float
-        Side of a patch, about.
+        Its side, about; scene units.
     scale : float
         As far apart places are no nearer than those of normals that differ by half of 90 degrees.
     places : Places
     patches : ndarray of int, shape (m,)
         The patch of each place.
     tree : KDTree
-        Of the patches' middles.
+        Of the places that stand for patches.
     floor : Floor or None
         Which reaches beyond its patches.
     roughly : bool
-        Whether few rays tell the light, and patches that of faces that are smaller.
+        Whether few rays tell the light, and patches of a cell, also that of faces that are smaller.
     rims : tuple of Circle
         Beside which the light is told closely.
     """
@@ -109,7 +112,7 @@ class Exchange:
     @cached_property
     def annuli(self) -> dict[int, Annulus]:
         """Beside rims on faces that see others, by numbers beyond those of the faces."""
-        some = [Annulus.beside(circle, _apart(self)) for circle in self.rims if self.has[circle.face]]
+        some = [Annulus.beside(self.solid, circle, _apart(self)) for circle in self.rims if self.has[circle.face]]
         return dict(enumerate(some, len(self.solid.faces)))
 
     @cached_property
@@ -128,12 +131,14 @@ class Exchange:
         return found
 
     @cached_property
-    def between(self) -> np.ndarray:
+    def between(self) -> csr_matrix:
         """Form factors between patches, (p, p)."""
+        from scipy.sparse import csr_matrix  # slow to load, and rarely needed
+
         rays, count = _ROUGH_RAYS if self.roughly else _RAYS, self.tree.n
         met = self.met(self.places.points, self.places.normals, rays, in_unit_square(len(self.places.points)))
-        pairs = np.bincount(self.patches[met.starts] * count + met.patches, minlength=count * count)
-        return pairs.reshape(count, count) / (rays * np.bincount(self.patches)[:, None])
+        patches = self.patches[met.starts]
+        return csr_matrix((1 / (rays * np.bincount(self.patches)[patches]), (patches, met.patches)), (count, count))
 
     @cached_property
     def lit(self) -> tuple[Places, np.ndarray]:
@@ -336,7 +341,7 @@ def exchange_of(
 ) -> Exchange | None:  # fmt: skip
     """Of the faces that see others, those ``without`` left out; None where fewer than two do.
 
-    Patches are smaller beside those of ``rims`` that such faces meet in.
+    Places are denser beside those of ``rims`` that such faces meet in.
     """
     from scipy.spatial import KDTree  # slow to load, and rarely needed
 
@@ -344,15 +349,17 @@ def exchange_of(
     if len(some) < 2:
         return None
     area = areas_of(solid.triangles[np.isin(solid.triangle_faces, some)]).sum()
-    count = _PATCHES if floor is None else _PATCHES + _FLOOR_PATCHES
+    count = _CELLS if floor is None else _CELLS + _FLOOR_CELLS
     places, cell = Places.spread(solid, some, count * _PLACES), float(np.sqrt(area / count))
     rims = tuple(rim for rim in rims if np.isin(bodies.edge(rim.edges[0]).faces, some).any())
     if rims:
-        places = places.beside(solid, some, _RIM_PATCHES * _PLACES, *about(rims))
+        places = places.beside(solid, some, _RIM_CELLS * _PLACES, *about(rims))
     scale = cell * (_RIM_SCALE if rims else 1.0)
     coordinates = _placed(places.points, places.normals, scale)
-    tree = KDTree(coordinates[_PLACES // 2 :: _PLACES])
-    return Exchange(solid, some, cell, scale, places, tree.query(coordinates)[1], tree, floor, roughly, rims)
+    of_patch = _PLACES if roughly else 1
+    tree = KDTree(coordinates[of_patch // 2 :: of_patch])
+    patches = tree.query(coordinates)[1] if roughly else np.arange(tree.n)
+    return Exchange(solid, some, cell, scale, places, patches, tree, floor, roughly, rims)
 
 
 def _seeing(bodies: Solid, floor: Floor | None) -> np.ndarray:
@@ -391,7 +398,7 @@ def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
 
 def _apart(exchange: Exchange) -> float:
     """How far apart nodes are on a face, about."""
-    return exchange.cell * np.sqrt(_PATCHES / _CELLS)
+    return exchange.cell * np.sqrt(_CELLS / _NODES)
 
 
 def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray, np.ndarray]:
@@ -435,7 +442,12 @@ def exchanged(
     white, normals = _white(scene, places.faces), normals_at(exchange.solid, places.faces, places.points)
     direct = sum(_arriving(scene, each, places.points, normals) for each in emitters)
     whites, lit = (np.bincount(patches, values) / np.bincount(patches) for values in (white, white * direct))
-    sent = np.linalg.solve(np.eye(exchange.tree.n) - whites[:, None] * exchange.between, lit)
+    sent = more = lit
+    for _ in range(_BOUNCES):
+        more = whites * (exchange.between @ more)
+        sent = sent + more
+        if more.max() <= _LEFT * sent.max():
+            break
     return Exchanged(scene, emitters, exchange, exchange.between @ sent)
 
 

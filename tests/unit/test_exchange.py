@@ -10,7 +10,7 @@ import trimesh
 import scenes
 from imaging.light import exchange as exchange_module
 from imaging.light.between import _of_faces, _plain, light_between
-from imaging.light.bore import _form_factors, bores
+from imaging.light.bore import _form_factors, _is_wall, bores
 from imaging.light.emitters import emitters
 from imaging.light.exchange import Hits, _arriving, _nodes, exchange_of, exchanged, room
 from imaging.light.nodes import _rim, frame_of, onto
@@ -50,6 +50,24 @@ def test_chamfers_are_no_wall_of_a_bore():
     chamfered = ring(0.5)
     assert sum(circle.hole for circle in chamfered.circles) == 2
     assert bores(chamfered) == ()
+
+
+@pytest.mark.parametrize("turned", [0.0, np.pi / 96])
+def test_a_bore_has_all_facets_of_its_wall(turned):
+    """Also where each triangle of it is a facet that ends at one of its rims alone, for they are turned to each other;
+    a wall that lacks a part, as where another hole ends in it, is none."""
+    mesh = trimesh.creation.revolve([(10.0, 0.0), (10.0, 5.0), (2.0, 5.0), (2.0, 0.0), (10.0, 0.0)], sections=96)
+    corners = mesh.vertices.copy()
+    rim = (np.hypot(*corners[:, :2].T) < 3) & (corners[:, 2] > 4)
+    turn = np.array([[np.cos(turned), np.sin(turned)], [-np.sin(turned), np.cos(turned)]])
+    corners[rim, :2] = corners[rim, :2] @ turn
+    solid = mesh_solid(trimesh.Trimesh(corners, mesh.faces, process=False))
+    (bore,) = bores(solid)
+    inside = np.flatnonzero(np.hypot(*solid.triangles.mean(1)[:, :2].T) < 2.01)
+    assert set(bore.faces) == set(solid.triangle_faces[inside].tolist())
+    assert len(bore.faces) == (192 if turned else 96)
+    assert _is_wall(solid, bore)
+    assert not _is_wall(solid, replace(bore, faces=bore.faces[: len(bore.faces) // 96 * 90]))
 
 
 _RAYS = 16384
@@ -96,20 +114,21 @@ def test_a_cavity_sees_itself_alone():
     inner.invert()
     solid = mesh_solid(trimesh.util.concatenate([trimesh.creation.box((5.0, 6.0, 4.0)), inner]))
     exchange = exchange_of(solid, ())
-    assert exchange.between.sum(1) == pytest.approx(1.0, abs=1e-12)
+    between = exchange.between.toarray()
+    assert between.sum(1) == pytest.approx(1.0, abs=1e-12)
     of_patch = [np.bincount(exchange.places.faces[exchange.patches == k]).argmax() for k in range(exchange.tree.n)]
     count = np.bincount(exchange.patches)
     for axis, (a, b) in enumerate([(4.0, 1.0), (3.0, 1.0), (3.0, 4.0)]):
         one, two = (f for f in exchange.faces if abs(solid.normals[f, axis]) > 0.5)
         of_one, of_two = np.equal(of_patch, one), np.equal(of_patch, two)
-        there, back = exchange.between[np.ix_(of_one, of_two)], exchange.between[np.ix_(of_two, of_one)]
+        there, back = between[np.ix_(of_one, of_two)], between[np.ix_(of_two, of_one)]
         x, y = np.array([a, b]) / (3.0, 4.0, 1.0)[axis]
         s, t = np.sqrt(1 + x**2), np.sqrt(1 + y**2)
         form = np.log(s * t / np.sqrt(1 + x**2 + y**2)) + x * t * np.arctan(x / t) + y * s * np.arctan(y / s)
         form = 2 / (np.pi * x * y) * (form - x * np.arctan(x) - y * np.arctan(y))
         there, back = (np.average(f.sum(1), weights=count[of]) for f, of in ((there, of_one), (back, of_two)))
-        assert [there, back] == pytest.approx([form, form], rel=0.15)  # margin: 0.05, patches at edges
-    assert exchange.tree.n == pytest.approx(400, abs=40)
+        assert [there, back] == pytest.approx([form, form], rel=0.17)  # margin: 0.08, few rays meet a small face
+    assert exchange.tree.n == 6000
 
 
 def test_many_points_see_what_each_of_them_does():
@@ -142,7 +161,9 @@ def test_what_rays_gather():
     ]
     both = exchanged(scene, shining[0] + shining[1], ())
     one, two = (exchanged(scene, each, ()) for each in shining)
-    assert both.arriving == pytest.approx(one.arriving + two.arriving, rel=1e-9)
+    assert both.arriving == pytest.approx(
+        one.arriving + two.arriving, rel=1e-7
+    )  # bounces are summed until 1e-9 is left
     exchange, places = both.exchange, both.exchange.places
     here = [3, 500, 2500, 5000]
     met = Hits(
