@@ -442,7 +442,7 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
 
 @pytest.mark.parametrize("below", [False, True])
 def test_what_is_compared_is_rendered_once(monkeypatch, below):
-    """The part as it is, and each of three steps of the light's place: four images, none twice.
+    """The part as it is, and each of three steps of the light's place, both ways: seven images, none twice.
 
     Below a megapixel with all light, and two more where it reflects less and more; else direct light alone, whose rest
     in the render is what surfaces send to each other.
@@ -458,15 +458,43 @@ def test_what_is_compared_is_rendered_once(monkeypatch, below):
     monkeypatch.setattr(imagery, "LARGE", 1 << 20 if below else 1)
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
     images = imagery.completed(picture, (np.full((2, 2), 77.0),), (), How())
-    assert [each[1:] for each in asked] == [(True, below)] * (4 + 2 * below)
+    assert [each[1:] for each in asked] == [(True, below)] * (7 + 2 * below)
     assert [shown is picture for shown, *_ in asked].count(True) == 1
-    assert len({shown for shown, *_ in asked}) == 4 + 2 * below
-    dark, here, first = scene.noise.dark_level, 52 if below else 51, 4 if below else 2
-    levels = [dark + (77 - dark) * (50 + k - dark) / (here - dark) for k in (1, *range(first, first + 3))]
-    more = dark + (77 - dark) * (53 - dark) / (here - dark)
-    reflected = [77 + (levels[0] - more) / 2, (levels[0] + more) / 2] if below else [77 - 51]
+    assert len({shown for shown, *_ in asked}) == 7 + 2 * below
+    dark, here, first = scene.noise.dark_level, 53 if below else 51, 54 if below else 52
+
+    def told(one, other, times):
+        one, other = (dark + (77 - dark) * (level - dark) / (here - dark) for level in (one, other))
+        return [77 + (one - other) / (2 * times), 77 + (one + other - 2 * 77) / (2 * times)]
+
+    reflected = told(51, 52, 1.0) if below else [77 - 51]
+    lit = [value for k in range(first, first + 6, 2) for value in told(k, k + 1, math.sqrt(3.0))]
     assert [each.flat[0] for each in images.changed["reflectance"]] == pytest.approx(reflected, rel=1e-12)
-    assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(levels[1:], rel=1e-12)
+    assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(lit, rel=1e-12)
+
+
+@pytest.mark.parametrize("overall", [False, True])
+def test_a_shadow_that_reaches_an_edge_from_where_a_light_may_stand_counts(monkeypatch, overall):
+    """From within a standard uncertainty of where it is meant to stand it changes nothing, nor the other way."""
+    scene = scenes.load("bracket").with_(uncertainty={"light_place": 0.01})
+    picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
+
+    def rendered(how, shown, effects, seed):
+        farther = shown.scene.lights[0].distance / scene.lights[0].distance - 1
+        return scene.noise.dark_level + np.array([[100.0, 0.0 if farther > 0.015 else 100.0]])
+
+    monkeypatch.setattr(How, "_rendered", rendered)
+    images = imagery.completed(picture, (How().image(picture),), (), How())
+    here, straight, bent = images.renders[0], *images.changed["light_place"][:2]
+    if overall:
+        of_all = imagery.of_all(picture, images, How())[0]
+        at = 2 + len(images.changed["reflectance"])
+        here, straight, bent = of_all[1], *of_all[at : at + 2]
+    shadow = 100.0 / (2 * math.sqrt(3.0))
+    assert (here - straight)[0, 1] == pytest.approx(shadow, rel=0.01)  # the rest is scaled to the same sum of squares
+    assert (here - bent)[0, 1] == pytest.approx(0.0 if overall else shadow, rel=0.01, abs=1e-12)
+    near = next(inputs.with_lights_moved(picture))
+    assert rendered(None, near, None, 0) == pytest.approx(here)  # negative control: one standard uncertainty tells none
 
 
 @pytest.mark.parametrize("overall", [False, True])
@@ -495,27 +523,29 @@ def test_a_reflectance_does_what_it_does_on_both_sides(monkeypatch, overall):
 
 def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
     """Each of other rays, of the picture as it is and as it is changed the same ones: the mean of what they tell."""
-    scene, seeds = scenes.load("bracket"), []
+    scene, seeds, ways = scenes.load("bracket"), [], {}
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
     dark = scene.noise.dark_level
 
     def rendered(how, shown, effects, seed):
         seeds.append(how.quality.seed + seed)
-        brighter = shown.scene.material.lambertian > scene.material.lambertian
-        step = (-1.0 if brighter else 1.0) * (1 + (how.quality.seed + seed - 7) ** 2)
-        return np.full((2, 2), dark + 50.0 + (0.0 if shown is picture else step))
+        if shown is not picture:
+            ways.setdefault(shown, (-1.0) ** len(ways))  # one way, and the other
+        step = ways.get(shown, 0.0) * (1 + (how.quality.seed + seed - 7) ** 2)
+        return np.full((2, 2), dark + 50.0 + step)
 
     monkeypatch.setattr(How, "_rendered", rendered)
     how = How(quality=Quality(seed=7))
     images = imagery.completed(picture, (np.full((2, 2), dark + 100.0),), (), how)
     settled = imagery.settled(picture, images, how)
-    assert sorted(seeds) == sorted(6 * [7, 8, 9, 10])
-    assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 2, "light_place": 3}
+    assert sorted(seeds) == sorted(9 * [7, 8, 9, 10])
+    assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 2, "light_place": 6}
     for name, some in settled.changed.items():
-        straight = slice(0, 1) if name == "reflectance" else slice(None)  # and one that is bent, of which nothing is
-        for settled_one, first_one in zip(some[straight], images.changed[name][straight], strict=True):
-            assert first_one == pytest.approx(np.full((2, 2), dark + 102.0), rel=1e-12)
-            assert settled_one == pytest.approx(np.full((2, 2), dark + 102.0 + 2 * (0 + 1 + 4 + 9) / 4), rel=1e-12)
+        far = 1.0 if name == "reflectance" else math.sqrt(3.0)
+        for settled_one, first_one in zip(some[::2], images.changed[name][::2], strict=True):  # others: what is bent
+            assert first_one == pytest.approx(np.full((2, 2), dark + 100.0 + 2.0 / far), rel=1e-12)
+            mean = 1 + (0 + 1 + 4 + 9) / 4
+            assert settled_one == pytest.approx(np.full((2, 2), dark + 100.0 + 2.0 * mean / far), rel=1e-12)
     assert settled.renders is images.renders
 
 
