@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
@@ -186,10 +187,11 @@ def test_what_is_not_signed_says_how_large_the_bias_may_be(small_task1):
         planner.budget(picture, doubts={"light_place": np.array([-1.0])})
 
 
-def test_lights_stand_a_step_beside():
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_lights_stand_a_step_beside(way):
     """Both directions are a degree away and across each other, at the pole, too (spherical cosine rule by hand)."""
     for pose in (Pose(40, 30), Pose(0, 10), Pose(180, 0), Pose(179.9, 300)):
-        places = [_unit(each) for each in (pose, *inputs._beside(pose, 1.0))]
+        places = [_unit(each) for each in (pose, *inputs._beside(pose, way * math.radians(1.0)))]
         here, along, across = places
         for other in (along, across):
             assert np.degrees(np.arccos(np.clip(here @ other, -1, 1))) == pytest.approx(1.0, rel=0.02)
