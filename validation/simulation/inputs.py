@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from imaging.features.measurand import measurands
+from imaging.geometry.projection import frame
 from imaging.light.appearance import is_plain
 from imaging.models.bias import bias
 from imaging.pictures import Pictures
@@ -76,11 +77,9 @@ def _with_light(scene: Scene, which: int, light) -> Scene:
 
 def _beside(pose: Pose, step: float) -> Iterator[Pose]:
     """Poses a step away, radians, along the meridian and across it."""
-    p, a = np.radians(list(pose))
-    here = np.array([math.sin(p) * math.cos(a), math.sin(p) * math.sin(a), math.cos(p)])
-    down = np.array([math.cos(p) * math.cos(a), math.cos(p) * math.sin(a), -math.sin(p)])
-    for way in (down, np.array([-math.sin(a), math.cos(a), 0.0])):
-        x, y, z = math.cos(step) * here + math.sin(step) * way
+    axes = frame(np.array(list(pose)))
+    for way in (axes.down, axes.right):
+        x, y, z = math.sin(step) * way - math.cos(step) * axes.forward
         yield Pose(math.degrees(math.atan2(math.hypot(x, y), z)), math.degrees(math.atan2(y, x)))
 
 
