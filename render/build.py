@@ -36,6 +36,7 @@ def description(
     crop: tuple[slice, slice],
     samples: int,
     textures: tuple[tuple[Face, ...], ...] | None = None,
+    met: int = SURFACES,
 ) -> dict:
     """Description of a scene with the named effects.
 
@@ -51,11 +52,13 @@ def description(
         Rays a fine pixel.
     textures : tuple of tuple of Face, optional
         Of `textured`, to be used instead of the surface's own reflectance.
+    met : int
+        Surfaces that light may meet, the one that is seen among them.
     """
     picture, active, scene = part.picture, part.active, part.picture.scene
     integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
     if "interreflection" in active:
-        integrator = {"type": "path", "max_depth": SURFACES + 1, "rr_depth": 99}
+        integrator = {"type": "path", "max_depth": met + 1, "rr_depth": 99}
     parts = {
         "type": "scene",
         "integrator": {**integrator, "hide_emitters": not part.silhouette, "block_size": _BLOCK},

@@ -17,11 +17,13 @@ import numpy as np
 from imaging.geometry.blur import confusion
 from imaging.geometry.projection import depth
 from imaging.light.appearance import is_plain
+from render import gathered
 from render import variant as variants
 from render.adaptive import bent, crossed, dilated, refine
 from render.between import edges_of, lent_to
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.even import Even, some_of
+from render.gathered import Gathering
 from render.large import Renders, fine_pixels, is_large, whole_pixels
 from render.mosaic import Tiles
 from render.parts import Part
@@ -159,6 +161,13 @@ class _Tracer:
         """Rays of a fine pixel where they are random and no edge crosses it."""
         return (self.quality.random_samples or (4 if self.quiet else 16)) * self.quality.denser**2
 
+    @cached_property
+    def gathering(self) -> Gathering | None:
+        """What adds light that met more surfaces than rays follow."""
+        between = self.active - self.sharp == {"interreflection"} and not self.part.silhouette
+        asked = self.quality.gathered and self.scalar and between and not self.quality.everywhere
+        return Gathering.of(self.mitsuba, self.part.reduced(self.active).picture) if asked else None
+
     @property
     def is_large(self) -> bool:
         apart = self.scalar and self.quality.alike  # what surfaces send to each other
@@ -189,7 +198,8 @@ class _Tracer:
     def load(self, active, samples: int, textures=None, divided: int = 1, shown: Picture | None = None) -> Any:
         """Scene of Mitsuba with some effects."""
         part = Part(shown or self.picture, self.part.active, self.part.silhouette).reduced(active)
-        made = description(self.mitsuba, part, *self.film(divided), samples, textures)
+        met = SURFACES if self.gathering is None else gathered.SURFACES
+        made = description(self.mitsuba, part, *self.film(divided), samples, textures, met)
         return self.mitsuba.load_dict(made, parallel=False)
 
     def rendered(self, loaded: Any, active, rays: int, divided: int = 1) -> np.ndarray:
@@ -225,7 +235,8 @@ class _Tracer:
             # a grid: of the faces of a light, or ways from face to face, it would find a few alone
             seen["sampler"] = {"type": "stratified", "jitter": False}
         sight = Sight.of(self.picture, active, self.quality.supersample // divided)
-        return Tiles(self.mitsuba, loaded, seen, (crop[0].start, crop[1].start), sight)
+        gathering = self.gathering if "interreflection" in active else None
+        return Tiles(self.mitsuba, loaded, seen, (crop[0].start, crop[1].start), sight, gathering=gathering)
 
     def whole(self, random: bool, count: int, where: np.ndarray | None = None) -> np.ndarray:
         """Image of whole pixels, with or without random rays; of a mask of them, 0 beside it."""

@@ -9,16 +9,18 @@ import numpy as np
 
 def mesh(
     mitsuba: Any, triangles: np.ndarray, bsdf: dict, texels: np.ndarray | None = None, emitter: dict | None = None,
-    normals: np.ndarray | None = None,
+    normals: np.ndarray | None = None, sent: np.ndarray | None = None,
 ) -> Any:  # fmt: skip
     """Triangles, shape (T, 3, 3), and where their corners lie in a texture, shape (T, 3, 2), if they have one.
 
-    With an ``emitter`` their outside shines.
+    With an ``emitter`` their outside shines; with ``sent``, shape (T,), each by so much.
 
     Without ``normals`` of the corners, shape (T, 3, 3), Mitsuba shades each triangle by its own plane: exactly flat.
     """
     properties = mitsuba.Properties()
     properties["bsdf"] = mitsuba.load_dict(bsdf)
+    if sent is not None:
+        emitter = {"type": "area", "radiance": {"type": "mesh_attribute", "name": "face_sent"}}
     if emitter is not None:
         properties["emitter"] = mitsuba.load_dict(emitter)
     corners = triangles.reshape(-1, 3)
@@ -33,4 +35,6 @@ def mesh(
     if normals is not None:
         values["vertex_normals"] = np.ascontiguousarray(normals, np.float32).ravel()
     values.update()
+    if sent is not None:
+        shape.add_attribute("face_sent", 1, np.ascontiguousarray(sent, np.float32))
     return shape

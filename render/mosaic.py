@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from render.adaptive import MISSED, crossed
+from render.gathered import Gathering
 from render.sight import Sight
 
 _SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels: each twice the one before
@@ -40,6 +41,8 @@ class Tiles:
         Of a telecentric camera.
     roughly : bool
         Whether its tiles may be large.
+    gathering : Gathering, optional
+        What adds to the image.
     """
 
     mitsuba: Any
@@ -48,6 +51,7 @@ class Tiles:
     start: tuple[int, int]
     sight: Sight | None = None
     roughly: bool = False
+    gathering: Gathering | None = None
 
     def refined(self, fine: np.ndarray, marked: np.ndarray, samples: int, seed: int) -> np.ndarray:
         """As `rendered`, and then those pixels again that turn out to be crossed as well."""
@@ -84,6 +88,8 @@ class Tiles:
             places = [(y + top, x + left) for y, x in part]
             sensor = _side_by_side(self.mitsuba, view, places, side, samples // len(pupils), *placed)
             strip = np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=number), float)[:, :, 0]
+            if self.gathering is not None:
+                strip += self.gathering.image(sensor, number)
             strip = strip.reshape(side, len(part), len(pupils), side).mean(2).reshape(side, -1)
             for i, (y, x) in enumerate(part):
                 above, before = max(-y, 0), max(-x, 0)  # of the tile, outside the image

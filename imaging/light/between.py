@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from imaging.light.bore import Bore, bores, light_in_bore, place_in
-from imaging.light.emitters import Emitter, emitters
+from imaging.light.emitters import Emitter, emitters, plain
 from imaging.light.exchange import Exchanged, exchanged, once_reflected
 from imaging.light.illumination import dimming_of_one
 from imaging.light.irradiance import beam
@@ -31,7 +31,7 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     asked = ~np.isin(faces, round_walls)
     if not pictures.closely or not is_exchanged(scene) or not points.size or not asked.any():
         return 0.0
-    shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
+    shining = tuple(plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
     points, faces = np.broadcast_to(points, (*shape, 3)), np.broadcast_to(faces, shape)
     lent = _of_faces(scene, shining, pictures.roughly)
@@ -65,7 +65,7 @@ def light_of_dimmed(
 def reflected_share(pictures: Pictures, points: np.ndarray, normals: np.ndarray, own: tuple[int, ...]) -> np.ndarray:
     """Light that met one other face of the bodies over what comes from the lights themselves where nothing is in their
     way, at points (n, 3) of unit normals, (n,); ``own`` are the facets of the surface that they lie on."""
-    shining = tuple(_plain(emitter) for emitter in emitters(pictures.scene, pictures.lights, GLANCE))
+    shining = tuple(plain(emitter) for emitter in emitters(pictures.scene, pictures.lights, GLANCE))
     direct = sum(beam(emitter, points).strength for emitter in shining)
     return once_reflected(pictures.scene, shining, points, normals, own) / direct
 
@@ -73,12 +73,6 @@ def reflected_share(pictures: Pictures, points: np.ndarray, normals: np.ndarray,
 def is_exchanged(scene: Scene) -> bool:
     """Whether any two surfaces see each other."""
     return not scene.bodies.is_convex or scene.bright_floor is not None
-
-
-def _plain(emitter: Emitter) -> Emitter:
-    """The emitter of one picture as a record that can be compared."""
-    at, axis = (None if v is None else tuple(v.reshape(-1, 3)[0].tolist()) for v in (emitter.at, emitter.axis))
-    return emitter._replace(at=at, axis=axis)
 
 
 def _of_faces(scene: Scene, shining: tuple[Emitter, ...], roughly: bool = False) -> Exchanged | None:

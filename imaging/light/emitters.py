@@ -91,3 +91,9 @@ def is_point(lights: tuple[Luminaire, ...]) -> bool:
 def nodes(light: Luminaire, reach: float, fewest: int = FULL) -> Nodes:
     """A light's nodes for places up to ``reach`` from the reference point; at least ``fewest`` each way."""
     return light.nodes(reach, fewest)
+
+
+def plain(emitter: Emitter) -> Emitter:
+    """The emitter of one picture as a record that can be compared."""
+    at, axis = (None if v is None else tuple(v.reshape(-1, 3)[0].tolist()) for v in (emitter.at, emitter.axis))
+    return emitter._replace(at=at, axis=axis)

@@ -42,6 +42,7 @@ _RIM_CELLS, _RIM_SCALE = 400, 0.5  # as many places more beside measured rims, a
 _PLACES, _RAYS = 15, 32  # of a cell, about, and from each of them; an odd number, or some are midway between two
 _LIT = 4  # times as many places tell what falls on patches where rims are measured: through a hole it is a small spot
 _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
+_FROM_PIECE = 64  # of a place that sends light on
 _BOUNCES, _LEFT = 200, 1e-9  # at most, and part of the light that is left after the last one
 _ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly, by patches of a cell
 _ROUGH_PATCHES = 4  # about a small face, whose light is then a mean of theirs
@@ -253,6 +254,14 @@ class Exchanged:
         away, near = exchange.tree.query(_placed(middles, solid.normals, exchange.scale), _ROUGH_PATCHES)
         weights = np.exp(-2 * (away**2 - away[:, :1] ** 2))
         return (weights * self.arriving[near]).sum(1) / weights.sum(1)
+
+    def sent_at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        """What points (n, 3) within faces (n,) send on of what arrives there."""
+        exchange, found, some = self.exchange, np.zeros(len(points)), self.exchange.has[faces]
+        normals = normals_at(exchange.solid, faces[some], points[some])
+        met = exchange.met(points[some], normals, _FROM_PIECE, in_unit_square(len(normals)))
+        found[some] = _white(self.scene, faces[some]) * self.gathered(met, len(normals), _FROM_PIECE)
+        return found
 
     def gathered(self, met: Hits, count: int, rays: int | np.ndarray) -> np.ndarray:
         """What arrives at ``count`` points from what so many rays, int or (count,), from each of them met.

@@ -28,7 +28,7 @@ class How:
     ``predicted``: whether the closed form of the bias is that of whatever measures in them.
     """
 
-    quality: Quality = Quality()
+    quality: Quality = Quality(gathered=True)
     variant: str | None = None
     effects: str = "auto"
     tolerance: EffectTolerance = EffectTolerance()

@@ -1,0 +1,67 @@
+"""Light that met two other surfaces at least before the one that is seen, gathered from patches of the first of them.
+
+Most of the noise of light between faces is that of light which met more than one, and little of the light: a ray finds
+by chance what has been sent on again. Patches (`imaging.light.exchange`) tell it without noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from imaging.light.senders import senders
+from render.meshes import mesh
+from scenes import Picture
+
+SURFACES = 2  # that light which rays find may meet, the one that is seen among them
+
+
+@dataclass(frozen=True, eq=False)
+class Gathering:
+    """Faces that shine by what they send on, and what finds their light.
+
+    Attributes
+    ----------
+    mitsuba : module
+    scene : mitsuba.Scene
+    met, seen : mitsuba.Integrator
+        Of what rays from a surface meet with what is seen, and of what is seen alone.
+    """
+
+    mitsuba: Any
+    scene: Any
+    met: Any
+    seen: Any
+
+    @classmethod
+    def of(cls, mitsuba: Any, picture: Picture) -> Gathering | None:
+        """Of a picture with one light; None where patches do not tell: where surfaces are glossy, printed on or
+        turned, or no two see each other."""
+        scene = picture.scene
+        bare = scene.surfaces.is_diffuse and not scene.textures and scene.camera.analyser_deg is None
+        found = senders(picture) if bare and not scene.solid.curved else None
+        if found is None:
+            return None
+        kinds, white = scene.surfaces.kinds, [each.diffuse() for each in scene.surfaces.materials]
+        if scene.bright_floor is not None:
+            kinds, white = np.append(kinds, len(white)), [*white, scene.bright_floor.reflectance]
+        made: dict[str, Any] = {"type": "scene"}
+        for kind in np.unique(kinds):
+            here = kinds[found.faces] == kind
+            bsdf = {"type": "diffuse", "reflectance": {"type": "spectrum", "value": white[kind]}}
+            made[f"kind{kind}"] = mesh(
+                mitsuba, found.triangles[here], bsdf, normals=found.normals[here], sent=found.sent[here]
+            )
+        met = {"type": "direct", "emitter_samples": 0, "bsdf_samples": 1}
+        integrators = (mitsuba.load_dict(each) for each in (met, {"type": "path", "max_depth": 1}))
+        return cls(mitsuba, mitsuba.load_dict(made, parallel=False), *integrators)
+
+    def image(self, sensor: Any, seed: int) -> np.ndarray:
+        """What a sensor sees of it, the same rays twice."""
+        met, seen = (
+            np.array(self.mitsuba.render(self.scene, sensor=sensor, integrator=way, seed=seed), float)[:, :, 0]
+            for way in (self.met, self.seen)
+        )
+        return met - seen
