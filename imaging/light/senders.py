@@ -52,5 +52,5 @@ def senders(picture: Picture) -> Senders | None:
         solid.triangles.reshape(-1, 3), corners, light.exchange.cell, max_iter=20, return_index=True
     )
     triangles, faces = vertices[corners], solid.triangle_faces[index]
-    normals = normals_at(solid, faces[:, None], triangles)
+    normals = np.broadcast_to(normals_at(solid, faces[:, None], triangles), triangles.shape)
     return Senders(triangles, normals, faces, scene.camera.exposure * light.sent_at(triangles.mean(1), faces))

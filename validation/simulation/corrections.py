@@ -49,8 +49,8 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     """The correction of a picture of a part whose statistical textures nobody knows, kept in this process.
 
     Where light takes random ways, four renders of few rays do, or two of a large image, if their noise is below a tenth
-    of sigma or a hundredth of the tolerance; else of all rays, and renders of other rays are added until it is, six at
-    most.
+    of sigma or a hundredth of the tolerance, or as many as six if these make it so; else of all rays, and renders of
+    other rays are added until it is, six at most.
     """
     return _simulated(picture, method, how.by(method))
 
@@ -118,17 +118,26 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
         images, told = completed(picture, few, (), how), propagated(few)
         of = partial(told_by, picture, method, told)
         found = of(images)
-        if _is_quiet(found):
+        if len(few) * _noise(found) ** 2 <= _MOST:
+            found, images = _quieter(picture, of, found, images, how.rough)
+        if _noise(found) <= 1:
             return sure(picture, found, of, more_telling(picture, images, how)), told
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
     images = rebased(images, renders) if images else completed(picture, renders, (), how)
     told = propagated(renders)
     of = partial(told_by, picture, method, told)
-    found = of(images)
-    while len(images.renders) < _MOST and not _is_quiet(found):
+    found, images = _quieter(picture, of, of(images), images, how)
+    return sure(picture, found, of, more_telling(picture, images, how)), told
+
+
+def _quieter(
+    picture: Picture, of: Callable[[Images], Correction], found: Correction, images: Images, how: How
+) -> tuple[Correction, Images]:
+    """With renders of other rays until they are quiet, `_MOST` at most."""
+    while _noise(found) > 1 and len(images.renders) < _MOST:
         images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
         found = of(images)
-    return sure(picture, found, of, more_telling(picture, images, how)), told
+    return found, images
 
 
 def told_by(picture: Picture, method: Method, told: PropagatedValues, images: Images) -> Correction:
@@ -156,11 +165,12 @@ def more_telling(picture: Picture, images: Images, how: How) -> list[Callable[[]
     ]
 
 
-def _is_quiet(found: Correction) -> bool:
+def _noise(found: Correction) -> float:
+    """Of the renderer, in parts of what it is to stay below, of the noisiest value."""
     tolerances = np.array([0.0 if q.tolerance is None else q.tolerance.half for q in found.quantities])
-    limit = np.maximum(_QUIET * found.sigma, _OF_TOLERANCE * tolerances)
-    noise = found.sources[RENDERING]
-    return bool((noise <= limit)[np.isfinite(noise) & np.isfinite(found.sigma)].all())
+    noise, limit = found.sources[RENDERING], np.maximum(_QUIET * found.sigma, _OF_TOLERANCE * tolerances)
+    known = np.isfinite(noise) & np.isfinite(found.sigma)
+    return float((noise[known] / np.maximum(limit[known], np.finfo(float).tiny)).max(initial=0.0))
 
 
 def _without_textures(scene: Scene) -> Scene:
