@@ -13,14 +13,14 @@ def mesh(
 ) -> Any:  # fmt: skip
     """Triangles, shape (T, 3, 3), and where their corners lie in a texture, shape (T, 3, 2), if they have one.
 
-    With an ``emitter`` their outside shines; with ``sent``, shape (T,), each by so much.
+    With an ``emitter`` their outside shines; with ``sent`` of the corners, shape (T, 3), by so much.
 
     Without ``normals`` of the corners, shape (T, 3, 3), Mitsuba shades each triangle by its own plane: exactly flat.
     """
     properties = mitsuba.Properties()
     properties["bsdf"] = mitsuba.load_dict(bsdf)
     if sent is not None:
-        emitter = {"type": "area", "radiance": {"type": "mesh_attribute", "name": "face_sent"}}
+        emitter = {"type": "area", "radiance": {"type": "mesh_attribute", "name": "vertex_sent"}}
     if emitter is not None:
         properties["emitter"] = mitsuba.load_dict(emitter)
     corners = triangles.reshape(-1, 3)
@@ -36,5 +36,5 @@ def mesh(
         values["vertex_normals"] = np.ascontiguousarray(normals, np.float32).ravel()
     values.update()
     if sent is not None:
-        shape.add_attribute("face_sent", 1, np.ascontiguousarray(sent, np.float32))
+        shape.add_attribute("vertex_sent", 1, np.ascontiguousarray(sent, np.float32).ravel())
     return shape

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from trimesh.remesh import subdivide_to_size
 
 from imaging.light.emitters import emitters, plain
-from imaging.light.exchange import exchanged
+from imaging.light.exchange import Exchange, exchanged
+from imaging.light.places import in_unit_square
 from imaging.pictures import Pictures
 from scenes import Picture
 from scenes.lights import GLANCE
 from scenes.parts.shading import normals_at
+
+_OF_WAY = 0.5  # of the way to what it sees nearest: the side of a piece
+_FINER, _LOOKS = 4.0, 16  # times smaller than cells it is at most; rays that look for it
+_WITHIN = 0.02  # of the way from a corner to the middle
+_SAME = 1e-6  # of a cell: corners nearer to each other are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +34,8 @@ class Senders:
         Of the surfaces in their corners.
     faces : ndarray of int, shape (n,)
         The face of each.
-    sent : ndarray, shape (n,)
-        Grey levels: what of its light has met another face before it.
+    sent : ndarray, shape (n, 3)
+        Grey levels, in their corners: what of their light has met another face before it.
     """
 
     triangles: np.ndarray
@@ -46,11 +52,63 @@ def senders(picture: Picture) -> Senders | None:
     light = exchanged(scene, shining, ())
     if light is None:
         return None
-    solid = light.exchange.solid
-    corners = np.arange(3 * len(solid.triangles)).reshape(-1, 3)
-    vertices, corners, index = subdivide_to_size(
-        solid.triangles.reshape(-1, 3), corners, light.exchange.cell, max_iter=20, return_index=True
-    )
-    triangles, faces = vertices[corners], solid.triangle_faces[index]
-    normals = np.broadcast_to(normals_at(solid, faces[:, None], triangles), triangles.shape)
-    return Senders(triangles, normals, faces, scene.camera.exposure * light.sent_at(triangles.mean(1), faces))
+    exchange = light.exchange
+    triangles, faces = _pieces(exchange)
+    normals = np.broadcast_to(normals_at(exchange.solid, faces[:, None], triangles), triangles.shape)
+    points, owners, which = _places(triangles, faces, exchange.cell)
+    sent = scene.camera.exposure * light.sent_at(points, owners)[which]
+    return Senders(triangles, normals, faces, sent)
+
+
+def _pieces(exchange: Exchange) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (n, 3, 3) of all faces, and the face of each: no larger than cells, and smaller the nearer what they
+    see is."""
+
+    def limit(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        return np.where(exchange.has[faces], exchange.cell, np.inf)
+
+    def less(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        near = np.maximum(_OF_WAY * _nearest(exchange, triangles.mean(1), faces), exchange.cell / _FINER)
+        return np.minimum(near, limit(triangles, faces))
+
+    return _halved(*_halved(exchange.solid.triangles, exchange.solid.triangle_faces, limit), less)
+
+
+def _halved(
+    triangles: np.ndarray, faces: np.ndarray, limit: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (n, 3, 3) of faces (n,), halved across their longest side until that is below the limit."""
+    done = []
+    while len(triangles):
+        sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=-1)
+        large = sides.max(1) > limit(triangles, faces)
+        done.append((triangles[~large], faces[~large]))
+        turned = (sides[large].argmax(1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.moveaxis(np.take_along_axis(triangles[large], turned[:, :, None], 1), 1, 0)
+        middle = (a + b) / 2
+        triangles, faces = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)]), np.tile(faces[large], 2)
+    found, owners = zip(*done, strict=True)
+    return np.concatenate(found), np.concatenate(owners)
+
+
+def _nearest(exchange: Exchange, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """How far what points (n, 3) within faces (n,) see is, where it is nearest, (n,); infinite where that is nothing."""
+    found, some = np.full(len(points), np.inf), np.flatnonzero(exchange.has[faces])
+    normals = exchange.solid.normals[faces[some]]
+    met = exchange.met(points[some], normals, _LOOKS, in_unit_square(len(some)))
+    np.minimum.at(found, some[met.starts], np.linalg.norm(met.points - points[some[met.starts]], axis=1))
+    return found
+
+
+def _places(triangles: np.ndarray, faces: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places (k, 3) that stand for the corners of triangles (n, 3, 3), their faces (k,), and which each is, (n, 3).
+
+    They lie a little within the triangles of one face about them: in an inner edge light comes from both sides.
+    """
+    owners = np.repeat(faces, 3)
+    keys = np.column_stack([owners, np.rint(triangles.reshape(-1, 3) / (_SAME * cell))])
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    inner = (triangles + _WITHIN * (triangles.mean(1, keepdims=True) - triangles)).reshape(-1, 3)
+    count = np.bincount(which.ravel())
+    points = np.column_stack([np.bincount(which.ravel(), axis) / count for axis in inner.T])
+    return points, owners[first], which.reshape(-1, 3)
