@@ -13,9 +13,15 @@ import numpy as np
 
 from imaging.light.senders import senders
 from render.meshes import mesh
-from scenes import Picture
+from scenes import Picture, Scene
 
 SURFACES = 2  # that light which rays find may meet, the one that is seen among them
+
+
+def is_gathered(scene: Scene) -> bool:
+    """Whether patches tell light between a scene's faces: these are diffuse, bare and none of a turned part."""
+    bare = scene.surfaces.is_diffuse and not scene.textures and scene.camera.analyser_deg is None
+    return bare and not scene.solid.curved
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +43,9 @@ class Gathering:
 
     @classmethod
     def of(cls, mitsuba: Any, picture: Picture) -> Gathering | None:
-        """Of a picture with one light; None where patches do not tell: where surfaces are glossy, printed on or
-        turned, or no two see each other."""
+        """Of a picture; None where patches do not tell (`is_gathered`), or no two faces see each other."""
         scene = picture.scene
-        bare = scene.surfaces.is_diffuse and not scene.textures and scene.camera.analyser_deg is None
-        found = senders(picture) if bare and not scene.solid.curved else None
+        found = senders(picture) if is_gathered(scene) else None
         if found is None:
             return None
         kinds, white = scene.surfaces.kinds, [each.diffuse() for each in scene.surfaces.materials]

@@ -7,15 +7,14 @@ import pytest
 import trimesh
 
 import scenes
-from imaging.geometry.rays import first_face
 from imaging.light import exchange
 from imaging.light.annulus import Annulus
-from imaging.light.between import _plain
-from imaging.light.emitters import emitters
+from imaging.light.emitters import emitters, plain
 from imaging.light.places import Places
 from imaging.pictures import Pictures
 from scenes import Circle
 from scenes.lights import GLANCE
+from tests.light_paths import traced
 
 
 def circle(hole=True, ends=None):
@@ -75,35 +74,15 @@ def _turned(profile, height, polar, folder):
     return scenes.Picture.of(scene, (0.0, 0.0), (polar, 20.0)), scene.solid.circle(rim.name)
 
 
-def _traced(solid, white, light, points, normal, paths, rng):
-    """Irradiance of points (n, 3) by light that met other faces, over that of a light of unit power at a distance of 1:
-    random paths, each way by Lambert's cosine, with the light's own share wherever they meet a face."""
-    at, normals = np.repeat(points, paths, 0), np.broadcast_to(normal, (len(points) * paths, 3))
-    found, weight, which = np.zeros(len(points)), 1.0, np.repeat(np.arange(len(points)), paths)
-    for _ in range(24):
-        ways = rng.normal(size=at.shape)
-        ways = normals + ways / np.linalg.norm(ways, axis=1, keepdims=True)
-        start, weight = at + 1e-6 * normals, white * weight
-        face, t = first_face(solid, start, ways, ())
-        met = face >= 0
-        at, normals, which = start[met] + t[met, None] * ways[met], solid.normals[face[met]], which[met]
-        lit = light - at
-        away = np.linalg.norm(lit, axis=1)
-        cosine = np.maximum((lit * normals).sum(1) / away, 0)
-        blocked = first_face(solid, at + 1e-6 * normals, lit, ())[0] >= 0
-        found += np.bincount(which, weight * np.where(blocked, 0, cosine / away**2), len(points))
-    return found / paths
-
-
 def test_the_ground_beside_a_rim_has_the_light_that_paths_tell(cup, monkeypatch):
     """A tenth of a millimetre from it, all around; by a face's own nodes and even patches it is farther off."""
     picture, rim = cup
     scene, pictures = picture.scene, Pictures.of(picture)
-    (shining,) = tuple(map(_plain, emitters(scene, pictures.lights, GLANCE)))
+    (shining,) = tuple(map(plain, emitters(scene, pictures.lights, GLANCE)))
     points = rim.centre + (rim.radius + 0.1) * rim.spokes(rim.angles(24))
     faces, white = np.full(24, rim.face), scene.material.diffuse()
-    traced = _traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 11, np.random.default_rng(1))
-    expected = traced * shining.power
+    paths = traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 11, np.random.default_rng(1))
+    expected = paths * shining.power
 
     def off():
         for each in (exchange.exchanged, exchange.exchange_of):
@@ -123,12 +102,12 @@ def test_the_ground_about_an_inner_edge_has_the_light_that_paths_tell(tmp_path):
     """0.15 mm from a pin's foot; by rings within the rim, in the pin, all light is that of the edge: 12.5 % off."""
     picture, rim = _turned(_PIN, 4.0, 45.0, tmp_path)
     scene = picture.scene
-    (shining,) = tuple(map(_plain, emitters(scene, Pictures.of(picture).lights, GLANCE)))
+    (shining,) = tuple(map(plain, emitters(scene, Pictures.of(picture).lights, GLANCE)))
     points = rim.centre + (rim.radius + 0.15) * rim.spokes(rim.angles(24))
     white, rng = scene.material.diffuse(), np.random.default_rng(1)
-    traced = _traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng) * shining.power
+    paths = traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng) * shining.power
     told = exchange.exchanged(scene, (shining,), ()).at(points, np.full(24, rim.face))
-    assert np.sqrt(np.mean((told / traced - 1) ** 2)) < 0.075  # margin: twice what is measured; 3.6 %
+    assert np.sqrt(np.mean((told / paths - 1) ** 2)) < 0.075  # margin: twice what is measured; 3.6 %
 
 
 def test_light_that_met_several_faces_is_as_paths_tell(tmp_path, monkeypatch):
@@ -138,17 +117,17 @@ def test_light_that_met_several_faces_is_as_paths_tell(tmp_path, monkeypatch):
     """
     picture, rim = _turned(_PIN, 4.0, 20.0, tmp_path)
     scene = picture.scene
-    (shining,) = tuple(map(_plain, emitters(scene, Pictures.of(picture).lights, GLANCE)))
+    (shining,) = tuple(map(plain, emitters(scene, Pictures.of(picture).lights, GLANCE)))
     points = rim.centre + (rim.radius + 0.1) * rim.spokes(rim.angles(24))
     white, rng = scene.material.diffuse(), np.random.default_rng(1)
-    traced = _traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng).mean() * shining.power
+    paths = traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng).mean() * shining.power
     monkeypatch.setattr(exchange, "measured_rims", lambda scene: scene.solid.rims)
     exchange.exchanged.cache_clear()
     light = exchange.exchanged(scene, (shining,), ())
     exchange.exchanged.cache_clear()
     met = light.exchange.met(points, np.broadcast_to(rim.axis, points.shape), 1 << 12)
     told = light.gathered(met, 24, 1 << 12).mean()
-    assert told == pytest.approx(traced, rel=0.03)  # margin: five times what is measured; 0.6 %
+    assert told == pytest.approx(paths, rel=0.03)  # margin: five times what is measured; 0.6 %
 
 
 def test_places_are_denser_about_a_rim():

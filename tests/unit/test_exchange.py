@@ -9,9 +9,9 @@ import trimesh
 
 import scenes
 from imaging.light import exchange as exchange_module
-from imaging.light.between import _of_faces, _plain, light_between
+from imaging.light.between import _of_faces, light_between
 from imaging.light.bore import _form_factors, _is_wall, bores
-from imaging.light.emitters import emitters
+from imaging.light.emitters import emitters, plain
 from imaging.light.exchange import Hits, _arriving, _nodes, exchange_of, exchanged, room
 from imaging.light.nodes import _rim, frame_of, onto
 from imaging.light.places import Places
@@ -181,7 +181,7 @@ def test_what_rays_gather():
 def slot_end(tmp_path_factory):
     """A slot's light between faces, eight facets of its dark round end, and rising depths below their rim, mm."""
     scene = scene_of(parts.slotted(), tmp_path_factory.mktemp("part"))
-    shining = tuple(map(_plain, emitters(scene, Pictures.of(scene, (28, 80), (35, 335)).lights, GLANCE)))
+    shining = tuple(map(plain, emitters(scene, Pictures.of(scene, (28, 80), (35, 335)).lights, GLANCE)))
     arc = next(arc for arc in scene.solid.arcs if arc.name == "c2")
     walls = [next(f for f in scene.solid.edge(name).faces if f != arc.face) for name in arc.edges]
     return _of_faces(scene, shining), walls[8:48:5], np.array([0.05, 0.3, 0.6, 1.0, 1.5, 2.0])
@@ -254,7 +254,7 @@ def test_light_that_is_told_roughly_is_near(part, tmp_path):
     """
     scene = _cup(tmp_path) if part == "cup" else scenes.load(part)
     pictures = Pictures.of(scene, (40, 20), (30, 100))
-    shining = tuple(_plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
+    shining = tuple(plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     exact, rough = (_of_faces(scene, shining, roughly) for roughly in (False, True))
     places = Places.spread(exact.exchange.solid, exact.exchange.faces, 500)
     there, found = (each.at(places.points, places.faces) for each in (exact, rough))

@@ -10,6 +10,7 @@ import measure
 import render
 from render import EffectTolerance, Quality
 from render import variant as variants
+from render.gathered import is_gathered
 from render.large import LARGE
 from scenes import Picture
 from validation.remeasured import Method
@@ -61,6 +62,16 @@ class How:
     def finer(self) -> How:
         """With four times the rays where single ones are random."""
         return replace(self, quality=replace(self.quality, denser=_DENSER * self.quality.denser))
+
+    @property
+    def gathering(self) -> How:
+        """With light between faces gathered, where that can be."""
+        return replace(self, quality=replace(self.quality, gathered=True))
+
+    def quieter(self, picture: Picture) -> How:
+        """With light between faces gathered, or with four times the rays where it is not."""
+        gathers = self.by_pixel and not self.everywhere and is_gathered(picture.scene)
+        return self.gathering if gathers else self.finer
 
     @property
     def by_pixel(self) -> bool:

@@ -54,7 +54,8 @@ class Renders:
 
 def steadied(picture: Picture, whole: np.ndarray, method: Method, how: How = How()) -> Renders:
     """A noise-free image and one of other rays; where the noise of their difference is above a tenth of sigma, as many
-    of each with four times the rays as make it so little; six at most.
+    of each as make it so little, six at most: what is measured with four times the rays, what tells its bias with light
+    between faces gathered (`Quality.gathered`) where that can be.
 
     A camera's picture has no such noise, but what is measured in noisy copies of one render has an error of its own,
     which no number of copies averages out. Four times the rays leave some 0.4 of it for three times the time.
@@ -67,12 +68,12 @@ def steadied(picture: Picture, whole: np.ndarray, method: Method, how: How = How
     renders = Renders(whole, (whole,), (how.image(picture, 1),))
     if not how.active(picture) & MANY_WAYS or _noise(picture, renders, method, how) <= _STILL:
         return renders
-    finer = how.finer
-    renders = Renders(whole, (finer.image(picture, _OTHERS),), (finer.image(picture, 1),))
+    ways = how.finer, how.quieter(picture)
+    renders = Renders(whole, (ways[0].image(picture, _OTHERS),), (ways[1].image(picture, 1),))
     more = range(1, min(math.ceil((_noise(picture, renders, method, how) / _STILL) ** 2), _MOST))
     measured, others = (
-        (first, *(finer.image(picture, seed + i) for i in more))
-        for first, seed in ((renders.measured[0], _OTHERS), (renders.others[0], 1))
+        (first, *(way.image(picture, seed + i) for i in more))
+        for way, first, seed in zip(ways, (renders.measured[0], renders.others[0]), (_OTHERS, 1), strict=True)
     )
     return Renders(whole, measured, others)
 
@@ -102,7 +103,7 @@ def independent(
     propagated : tuple of PropagatedValues
         What `measure.propagate` says of their mean, by method.
     """
-    how = how.by(*methods)
+    how = how.by(*methods).gathering
     images = completed(picture, renders.others, renders.measured, how)
     more, found = [cache(each) for each in more_telling(picture, images, how)], []
     for each, told in zip(methods, propagated, strict=True):
