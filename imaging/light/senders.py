@@ -55,9 +55,11 @@ def senders(picture: Picture) -> Senders | None:
     exchange = light.exchange
     triangles, faces = _pieces(exchange)
     normals = np.broadcast_to(normals_at(exchange.solid, faces[:, None], triangles), triangles.shape)
-    points, owners, which = _places(triangles, faces, exchange.cell)
-    sent = scene.camera.exposure * light.sent_at(points, owners)[which]
-    return Senders(triangles, normals, faces, sent)
+    which, points = _places(triangles, normals, exchange.cell)
+    first = np.unique(which, return_index=True)[1]
+    owners = np.repeat(faces, 3)[first]
+    sent = scene.camera.exposure * light.sent_at(points, owners)
+    return Senders(triangles, normals, faces, sent[which])
 
 
 def _pieces(exchange: Exchange) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from validation.remeasured import Method
 BETWEEN = "interreflection"
 _DENSER = 2  # times more rays, each way, where single ones are random
 _FEW = {"supersample": 2, "samples": 1, "edge_samples": 64, "random_samples": 16}  # rays
-_ALIKE = {"samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True}
+_ALIKE = {"samples": 1, "edge_samples": 16, "random_samples": 64, "alike": True, "gathered": False}
 _FINE, _COARSE = 4, 2  # fine pixels a pixel, each way, of images that are compared, up to a megapixel and above
 
 
