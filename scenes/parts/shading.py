@@ -14,6 +14,7 @@ from itertools import chain
 import numpy as np
 
 from scenes.parts.chains import SINGLE, components
+from scenes.parts.rows import different
 from scenes.parts.solid import Solid
 
 _UNSURE = 1e-3  # rad: a facet that rounding may turn by so much counts half
@@ -54,7 +55,7 @@ def corner_normals(solid: Solid) -> np.ndarray:
     if not facet.any():
         return found
     corners = np.concatenate([solid.vertices, solid.triangles[facet].reshape(-1, 3)])
-    _, number = np.unique(corners, axis=0, return_inverse=True)
+    _, number = different(corners)
     of_vertex, of_corner = np.split(number, [len(solid.vertices)])
     face = np.repeat(solid.triangle_faces[facet], 3)
     own, mean = solid.normals[face], _means(solid, face, of_corner, of_vertex)
