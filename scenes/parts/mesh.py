@@ -113,7 +113,9 @@ def _check_told(path: Path, data: bytes, kind: str) -> None:
         told = int.from_bytes(data[80:_STL_HEAD], "little")
         there = (len(data) - _STL_HEAD) // _STL_TRIANGLE
         if there < told <= MOST_TRIANGLES:
-            raise InvalidInput(f"object.file must be a whole file, got {path}, cut off after {there} of {told} triangles")
+            raise InvalidInput(
+                f"object.file must be a whole file, got {path}, cut off after {there} of {told} triangles"
+            )
     if kind == "ply":
         counts = re.findall(rb"element\s+\w+\s+(\d{1,20})", data[:10_000])
         told = max(map(int, counts), default=0)

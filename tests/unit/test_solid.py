@@ -92,7 +92,7 @@ def test_a_file_that_is_cut_off_says_so(tmp_path, header):
     path.write_bytes(header + block[80:])
     assert len(mesh.read(path).faces) == 6
     path.write_bytes(header + block[80 : 84 + 7 * 50 + 20])
-    with pytest.raises(InvalidInput, match="must be a whole file, got .*, cut off after 7 of 12 triangles"):
+    with pytest.raises(InvalidInput, match=r"must be a whole file, got .*, cut off after 7 of 12 triangles"):
         mesh.read(path)
 
 
