@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from scenes import Solid
+from scenes.parts.rows import different
 
 try:  # has wheels for x86-64
     from embreex import rtcore_scene
@@ -354,7 +355,7 @@ class Plates:
     @cached_property
     def _corner_numbers(self) -> np.ndarray:
         """Of each triangle's corners among the different places, (T, 3)."""
-        return np.unique(self.corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(3, -1).T
+        return different(self.corners.reshape(-1, 3))[1].reshape(3, -1).T
 
     @cached_property
     def _at_corners(self) -> csr_array:

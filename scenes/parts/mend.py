@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from scenes.errors import InvalidInput
+from scenes.parts.rows import different
 
 _GAP = 1e-5  # of the part's size: open edges that lie closer are one
 _SAME = 1e-5  # rad, between triangles of one plane
@@ -54,7 +55,7 @@ def _without_doubled(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]
     faces, flat = mesh.faces[whole], len(mesh.faces) - len(whole)
     turn = np.take_along_axis(faces, (faces.argmin(1)[:, None] + np.arange(3)) % 3, 1)  # the least corner first
     looks = np.where(turn[:, 1] < turn[:, 2], 1, -1)
-    _, which = np.unique(np.sort(faces, 1), axis=0, return_inverse=True)
+    _, which = different(np.sort(faces, 1))
     balance, many = np.bincount(which, looks), np.bincount(which)
     kept = np.zeros(len(faces), bool)
     for sign in (1, -1):
@@ -142,8 +143,8 @@ def _parted(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     Around an edge the triangles between which there is material belong together.
     """
     halves = np.sort(_halves(mesh.faces), 1)
-    edges, which, many = np.unique(halves, axis=0, return_inverse=True, return_counts=True)
-    touching = np.flatnonzero(many > 2)
+    edges, which = different(halves)
+    touching = np.flatnonzero(np.bincount(which) > 2)
     if not touching.size:
         return mesh, []
     faces, vertices = mesh.faces.tolist(), mesh.vertices.tolist()
@@ -209,7 +210,7 @@ def _open(faces: np.ndarray) -> np.ndarray:
     """Edges that triangles pass one way more often than the other, (n, 2)."""
     halves = _halves(faces)
     way = np.where(halves[:, 0] < halves[:, 1], 1, -1)
-    edges, which = np.unique(np.sort(halves, 1), axis=0, return_inverse=True)
+    edges, which = different(np.sort(halves, 1))
     return edges[np.bincount(which, way) != 0]
 
 

@@ -37,6 +37,7 @@ MOST_BYTES = 64 << 20
 MOST_TRIANGLES = 1_000_000
 _FARTHEST = 1e9  # beyond, its faces cannot be told to be flat
 _PLAIN = {"obj": {"skip_materials": True}}
+_STL_HEAD, _STL_TRIANGLE = 84, 50  # bytes of a binary file
 _FLAT = 1e-4  # rad; single-precision files are flat to about 1e-6
 _SINGLE = 3e-7  # of the largest coordinate: what single precision leaves of a height
 
@@ -106,10 +107,15 @@ def _uncollected() -> Iterator[None]:
 
 
 def _check_told(path: Path, data: bytes, kind: str) -> None:
-    """Refuse what says of itself that it is too large, before memory is taken for it."""
+    """Refuse what says of itself that it is too large, before memory is taken for it, and what is cut off."""
     told = 0
-    if kind == "stl" and len(data) >= 84 and data.lstrip()[:5].lower() != b"solid":
-        told = int.from_bytes(data[80:84], "little")
+    if kind == "stl" and len(data) >= _STL_HEAD and (data.lstrip()[:5].lower() != b"solid" or data[_STL_HEAD - 1] == 0):
+        told = int.from_bytes(data[80:_STL_HEAD], "little")
+        there = (len(data) - _STL_HEAD) // _STL_TRIANGLE
+        if there < told <= MOST_TRIANGLES:
+            raise InvalidInput(
+                f"object.file must be a whole file, got {path}, cut off after {there} of {told} triangles"
+            )
     if kind == "ply":
         counts = re.findall(rb"element\s+\w+\s+(\d{1,20})", data[:10_000])
         told = max(map(int, counts), default=0)

@@ -9,10 +9,12 @@ it is interpolated in each triangle, in models and in renders alike. Plane faces
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import chain
 
 import numpy as np
 
 from scenes.parts.chains import SINGLE, components
+from scenes.parts.rows import different
 from scenes.parts.solid import Solid
 
 _UNSURE = 1e-3  # rad: a facet that rounding may turn by so much counts half
@@ -53,12 +55,10 @@ def corner_normals(solid: Solid) -> np.ndarray:
     if not facet.any():
         return found
     corners = np.concatenate([solid.vertices, solid.triangles[facet].reshape(-1, 3)])
-    places, number = np.unique(corners, axis=0, return_inverse=True)
+    _, number = different(corners)
     of_vertex, of_corner = np.split(number, [len(solid.vertices)])
-    surface = _surfaces(solid)
-    means = _means(solid, surface, of_vertex, len(places))
     face = np.repeat(solid.triangle_faces[facet], 3)
-    own, mean = solid.normals[face], means[surface[face] * len(places) + of_corner]
+    own, mean = solid.normals[face], _means(solid, face, of_corner, of_vertex)
     alike = (mean * own).sum(1) >= _MOST
     found[facet] = np.where(alike[:, None], mean, own).reshape(-1, 3, 3)
     for each in solid.curved:
@@ -67,39 +67,69 @@ def corner_normals(solid: Solid) -> np.ndarray:
     return found
 
 
+def _smooth(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Faces and ends of the edges that are smooth, (n, 2) each."""
+    rows = [(edge.faces, edge.ends) for edge in solid.edges if edge.kind == "smooth"]
+    faces, ends = np.moveaxis(np.array(rows, int).reshape(-1, 2, 2), 1, 0)
+    return faces, ends
+
+
 def _surfaces(solid: Solid) -> np.ndarray:
     """Number of the curved surface that each facet is of, (F,): smooth edges join them."""
-    smooth = np.array([edge.faces for edge in solid.edges if edge.kind == "smooth"], int).reshape(-1, 2)
-    return components(len(solid.faces), smooth[~solid.plane[smooth].any(1)])
+    faces, _ = _smooth(solid)
+    return components(len(solid.faces), faces[~solid.plane[faces].any(1)])
 
 
-def _means(solid: Solid, surface: np.ndarray, place: np.ndarray, count: int) -> np.ndarray:
-    """Unit normals of surfaces at places, in the row surface x count + place, 0 where there is none.
+def _means(solid: Solid, faces: np.ndarray, places: np.ndarray, of_vertex: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 3) of the surfaces of facets (n,) at the numbers of places (n,); 0 where there is none.
 
-    ``place`` (V,) is that of each vertex, of so many.
+    ``of_vertex`` (V,) is the place of each vertex.
     """
+    surface = _surfaces(solid)
     face, here, weight = _weights(solid)
     facet = ~solid.plane[face]
-    rows = (surface[face] * count + place[here])[facet]
-    found = np.zeros((count * (surface.max() + 1), 3))
-    np.add.at(found, rows, (weight[:, None] * solid.normals[face])[facet])
+    face, here, weight = face[facet], here[facet], weight[facet]
+    beside, plane, ends = _smooth_to_planes(solid)
+    wanted, summed, continued = _numbered(
+        (surface[faces], places), (surface[face], of_vertex[here]), (surface[beside], of_vertex[ends])
+    )
+    found = np.zeros((1 + max(wanted.max(), summed.max(), continued.max(initial=0)), 3))
     of_planes = np.zeros_like(found)
-    for edge in solid.edges:
-        if edge.kind == "smooth" and solid.plane[list(edge.faces)].sum() == 1:
-            plane, facet = sorted(edge.faces, key=lambda each: not solid.plane[each])
-            of_planes[surface[facet] * count + place[list(edge.ends)]] += solid.normals[plane]
-    found = np.where(of_planes.any(1)[:, None], of_planes, found)
+    np.add.at(found, summed, weight[:, None] * solid.normals[face])
+    np.add.at(of_planes, continued, solid.normals[plane])
+    found = np.where(of_planes.any(1)[:, None], of_planes, found)[wanted]
     size = np.linalg.norm(found, axis=1, keepdims=True)
     return found / np.where(size > 0, size, 1.0)
+
+
+def _smooth_to_planes(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of both ends of each smooth edge between a facet and a plane face: facet, plane face, vertex, (n,) each."""
+    faces, ends = _smooth(solid)
+    mixed = solid.plane[faces].sum(1) == 1
+    faces, ends = faces[mixed], ends[mixed]
+    plane = solid.plane[faces]
+    return np.repeat(faces[~plane], 2), np.repeat(faces[plane], 2), ends.reshape(-1)
+
+
+def _numbered(*pairs: tuple[np.ndarray, np.ndarray]) -> list[np.ndarray]:
+    """Of several sets of pairs of numbers, (n,) and (n,), each pair's number among all that occur, (n,) of each set."""
+    one, other = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    _, number = np.unique(one * (other.max() + 1) + other, return_inverse=True)
+    return np.split(number, np.cumsum([len(each) for each, _ in pairs])[:-1])
 
 
 def _weights(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of each corner of each face's outline: the face, the vertex, and how much its normal counts there, (n,)."""
     many = np.array([len(loop) for loop in solid.faces])
-    face, here = np.repeat(np.arange(len(many)), many), np.concatenate([np.array(loop) for loop in solid.faces])
-    ahead, back = (np.concatenate([np.roll(loop, step) for loop in solid.faces]) for step in (-1, 1))
-    one, two = (solid.vertices[other] - solid.vertices[here] for other in (ahead, back))
-    longest = np.maximum.reduceat(np.linalg.norm(one, axis=1), np.cumsum(many) - many)
+    face, here = np.repeat(np.arange(len(many)), many), np.array([*chain.from_iterable(solid.faces)])
+    last = np.cumsum(many) - 1
+    first = last + 1 - many
+    ahead = np.arange(1, len(here) + 1)
+    ahead[last] = first
+    back = np.arange(-1, len(here) - 1)
+    back[first] = last
+    one, two = (solid.vertices[here[other]] - solid.vertices[here] for other in (ahead, back))
+    longest = np.maximum.reduceat(np.linalg.norm(one, axis=1), first)
     unsure = SINGLE * np.abs(solid.vertices).max() * longest / solid.areas
     with np.errstate(divide="ignore", invalid="ignore"):
         weight = np.linalg.norm(np.cross(one, two), axis=1) / ((one**2).sum(1) * (two**2).sum(1))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from scenes.parts.curved import Curved
+from scenes.parts.rows import different
 from scenes.parts.surfaces import axes_beside
 
 if TYPE_CHECKING:
@@ -199,7 +200,7 @@ class Solid:
     @cached_property
     def triangle_corners(self) -> tuple[np.ndarray, np.ndarray]:
         """The different corners of all triangles, (P, 3), and which of them each triangle has, (T, 3)."""
-        points, number = np.unique(self.triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        points, number = different(self.triangles.reshape(-1, 3))
         return points, number.reshape(-1, 3)
 
     @cached_property

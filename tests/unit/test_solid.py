@@ -85,6 +85,17 @@ def test_bad_mesh_file(tmp_path, content, line):
         mesh.read(path)
 
 
+@pytest.mark.parametrize("header", [bytes(80), b"solid of an exporter".ljust(80)], ids=["empty", "solid"])
+def test_a_file_that_is_cut_off_says_so(tmp_path, header):
+    """A binary file of 12 triangles that ends within the eighth, whatever its header is; as a whole it is read."""
+    path, block = tmp_path / "part.stl", trimesh.creation.box((1, 1, 1)).export(file_type="stl")
+    path.write_bytes(header + block[80:])
+    assert len(mesh.read(path).faces) == 6
+    path.write_bytes(header + block[80 : 84 + 7 * 50 + 20])
+    with pytest.raises(InvalidInput, match=r"must be a whole file, got .*, cut off after 7 of 12 triangles"):
+        mesh.read(path)
+
+
 def test_open_mesh_is_refused(tmp_path):
     shape = trimesh.creation.box((1, 1, 1))
     shape.update_faces(np.arange(len(shape.faces)) > 0)
