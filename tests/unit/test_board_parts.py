@@ -347,6 +347,34 @@ def test_least_squares_with_poses_eliminated():
     assert held[0][0] > 0.5
 
 
+@pytest.mark.parametrize("rounding", [0.0, 1e-12])
+def test_least_squares_end_before_the_level_of_rounding(rounding):
+    """Of residuals that bend, of some 1e3 in all, with what another machine may round otherwise: as near as 1e-5 of
+    each sigma to the least, in a few looks."""
+    rng = np.random.default_rng(6)
+    shared, own, right, whole = blocks_of(rng)
+    right, looks, prior = 5 * right, [], np.zeros((0, 4))
+    rows = whole.reshape(3, 20, -1)
+
+    def residuals(point):
+        left = [a @ point[0] + b @ p - r for a, b, p, r in zip(shared, own, point[1], right, strict=True)]
+        return [each + 1e-3 * each**2 + rounding * rng.normal(size=20) * np.abs(each) for each in left], left
+
+    def blocks(point):
+        return [Block(r, a * (1 + 2e-3 * e)[:, None], b * (1 + 2e-3 * e)[:, None])
+                for r, e, a, b in zip(*residuals(point), shared, own, strict=True)]  # fmt: skip
+
+    def cost(point):
+        looks.append(1)
+        return sum(r @ r for r in residuals(point)[0])
+
+    found = minimised(blocks, cost, prior, (np.zeros(4), np.zeros((3, 6))), lambda shared: True)
+    assert len(looks) <= 12  # 6 found, 27 where rounding alone decides
+    matrix = np.concatenate([(1 + 2e-3 * e)[:, None] * part for e, part in zip(residuals(found)[1], rows, strict=True)])
+    decrement = np.linalg.lstsq(matrix, np.concatenate(residuals(found)[0]))[0]
+    assert np.linalg.norm(matrix @ decrement) < 1e-5
+
+
 def test_places_of_corners_on_a_board():
     board = told(np.zeros((6, 2)), np.tile(np.eye(2), (6, 1, 1)), (3, 2))
     assert on_board(board, 2.5).tolist() == [[0, 0, 0], [2.5, 0, 0], [5, 0, 0], [0, 2.5, 0], [2.5, 2.5, 0], [5, 2.5, 0]]

@@ -93,7 +93,7 @@ def test_a_board_of_which_a_corner_is_taken_for_another_is_found(folder):
 
 def test_edges_bent_by_what_is_not_known_of_the_lens_are_no_misfit(folder):
     """k1 is told 1.75 standard deviations off by the board, which bends edges visibly; a scratch beside one is one."""
-    picture, there, image = _of_a_camera(folder, 8)
+    picture, _, image = _of_a_camera(folder, 8)
     where = measure.locate(image, picture)
     told = measure.measure(image, where.picture)
     assert told.status.tolist() == ["ok"] * 3
