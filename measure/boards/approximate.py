@@ -84,7 +84,8 @@ def even(grid: np.ndarray) -> np.ndarray:
     """The grid (rows, columns, 2), its corners that are astray moved to where their neighbours say.
 
     OpenCV may take a corner of the board's rim, or none, for an inner one. One after the other that is moved with which
-    the fewest pairs and threes of neighbours agree, until half of them do with each: one astray speaks for others, too.
+    the fewest pairs and threes of neighbours agree, and of these the farthest off, until half of them do with each: one
+    astray speaks for others, too.
     """
     grid = grid.copy()
     for _ in range(grid.size // 2):
@@ -92,9 +93,11 @@ def even(grid: np.ndarray) -> np.ndarray:
         middle = np.nanmedian(told, 0)
         near = _ASTRAY * np.linalg.norm(steps(middle), axis=-1).min(-1)
         agree = (np.linalg.norm(told - grid, axis=-1) < near).sum(0) / np.isfinite(told[..., 0]).sum(0)
-        worst = np.unravel_index(np.argmin(agree), agree.shape)
-        if agree[worst] >= _AGREED:
+        off = np.linalg.norm(middle - grid, axis=-1)
+        astray = np.argwhere((agree < _AGREED) & (off > 0))
+        if not astray.size:
             break
+        worst = min(map(tuple, astray), key=lambda at: (agree[at], -off[at]))
         grid[worst] = middle[worst]
     return grid
 
