@@ -99,8 +99,13 @@ def test_lines_on_the_rim_are_taken_off(board):
     assert trimmed(grey, more[:3, :]) is None
 
 
-@pytest.mark.parametrize("astray", [{(0, 3): (0, -16)}, {(0, 7): (-6, -15)}, {(0, 0): (-4, 3), (4, 8): (9, 9)},
-                                    {(0, 3): (16, 0), (0, 5): (0, -16)}, {(0, 0): (-4, 1), (0, 4): (-2, 6), (0, 5): (-5, -16)}, {(2, 5): (3.8, 0)}])  # fmt: skip
+@pytest.mark.parametrize(
+    "astray",
+    [
+        {(0, 3): (0, -16)}, {(0, 7): (-6, -15)}, {(0, 0): (-4, 3), (4, 8): (9, 9)}, {(2, 5): (3.8, 0)},
+        {(0, 3): (16, 0), (0, 5): (0, -16)}, {(0, 0): (-4, 1), (0, 4): (-2, 6), (0, 5): (-5, -16)},
+    ],
+)  # fmt: skip
 def test_corners_astray_are_moved_to_where_their_neighbours_say(astray):
     """Onto the rim, to another corner, a quarter of a step; beside the board's corners, too. The others stay."""
     row, column = np.mgrid[:5, :9]
