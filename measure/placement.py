@@ -33,7 +33,8 @@ class Located:
     ----------
     picture : Picture
         The part where it lies to a few hundredths of a px, as `measure.measure` takes it, which adjusts the rest; as
-        the scene says where `status` is not ``ok``.
+        the scene says where `status` is not ``ok``. Where a board tells k1 so that edges are a misfit, by the k1 near
+        it with which they are straightest.
     placement : ndarray, shape (6 + c,)
         Shift along x, y and z, the scene's unit, and rotation vector about the point that the camera looks at,
         degrees; then the deviation of each of ``placement.camera``, of the focal length its logarithm.
