@@ -13,6 +13,7 @@ from imaging.light.appearance import is_plain
 from imaging.placed import combined, placed
 from measure.best import best_estimator
 from measure.features.board import by_board
+from measure.goodness import WORST
 from measure.measurement import DEFAULT_ESTIMATOR, checked_image
 from measure.quantities import MeasuredFeatures, find
 from measure.registration import Place, candidates, rivals
@@ -20,6 +21,7 @@ from scenes import InvalidInput, Picture, Scene, status
 from scenes.arrays import picture as one_picture
 
 _STEPS = 6
+_BENDS = (1.0, -1.0, 2.0, -2.0, 3.0, -3.0)  # standard deviations of k1
 _SETTLED = 0.02  # px that an adjustment still moves a datum: what is not linear in it is then far below the noise
 
 
@@ -31,7 +33,8 @@ class Located:
     ----------
     picture : Picture
         The part where it lies to a few hundredths of a px, as `measure.measure` takes it, which adjusts the rest; as
-        the scene says where `status` is not ``ok``.
+        the scene says where `status` is not ``ok``. Where a board tells k1 so that edges are a misfit, by the k1 near
+        it with which they are straightest.
     placement : ndarray, shape (6 + c,)
         Shift along x, y and z, the scene's unit, and rotation vector about the point that the camera looks at,
         degrees; then the deviation of each of ``placement.camera``, of the focal length its logarithm.
@@ -121,7 +124,30 @@ def adjusted(
                 break
         else:
             return _nowhere(picture, status.ILL_CONDITIONED, "its adjustment does not settle", explained)
-    return Located(placed(picture, before), here, found.adjustment.covariance()[0], status.OK, explained)
+    best = _straightest(image, picture, before, found, passes[-1])
+    return Located(placed(picture, best), here, found.adjustment.covariance()[0], status.OK, explained)
+
+
+def _straightest(
+    image: np.ndarray, picture: Picture, here: np.ndarray, found: MeasuredFeatures, last: tuple[str, bool]
+) -> np.ndarray:
+    """Where edges are as straight as they look, (6 + c,): a placement, or near it as far as k1 is not known.
+
+    A board may leave more of k1 open than edges do, which then are a misfit of the lens that it tells. What is adjusted
+    is the same from either.
+    """
+    numbers, (method, lit) = picture.scene.placement.camera, last
+    if "k1" not in numbers or not found.shape.p_value[0] < WORST:
+        return here
+    covariance, k1 = found.adjustment.covariance()[0], 6 + numbers.index("k1")
+    along = covariance[k1] / np.sqrt(covariance[k1, k1])
+    likely = {}
+    for many in _BENDS:
+        there = placed(picture, combined(here, many * along))
+        fits = find(image[None], there if lit else there.unlit(), method).shape.p_value[0]
+        likely[many] = np.nan_to_num(fits) * np.exp(-(many**2) / 2)
+    best = max(likely, key=lambda many: likely[many])
+    return combined(here, best * along) if likely[best] > found.shape.p_value[0] else here
 
 
 def _told(found: MeasuredFeatures) -> np.ndarray:

@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 
 from imaging.boards.windows import Marked
-from measure.boards.chessboard import Board, Squares, check_noise, check_shape, least_noise, measured
+from measure.boards.chessboard import Board, Squares, check_noise, check_shape, measured
 from measure.boards.reading import Legible
-from measure.photo.noise import noise_sigma
 from scenes.arrays import picture
 from scenes.errors import InvalidInput
 from scenes.markers import read_dictionary
@@ -51,8 +50,7 @@ def charuco(image: Any, shape: tuple[int, int], dictionary: str, marker: float, 
             f"image must show a ChArUco board of {shape[0]} x {shape[1]} inner corners and markers of {dictionary}, "
             "got none"
         )
-    noise = noise_sigma(image) if noise is None else float(noise)
-    return measured(image, grid, max(noise, least_noise(image)), Squares(Marked((1 - float(marker)) / 2, first)))
+    return measured(image, grid, noise, Squares(Marked((1 - float(marker)) / 2, first)))
 
 
 def charuco_boards(shape: Any, dictionary: Any, marker: Any) -> tuple[cv2.aruco.CharucoBoard, ...]:

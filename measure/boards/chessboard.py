@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from scipy import sparse
-from scipy.special import chdtrc
+from scipy.special import chdtrc, chdtri
 
 from imaging.boards.fitting import Crossings, crossing_rows, fit_crossings
 from imaging.boards.windows import Marked, Windows, steps, windows
@@ -108,8 +108,7 @@ def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | 
     if grid is None:
         wanted = f"of {shape[0]} x {shape[1]} inner corners" if shape else "of at least 3 x 3 inner corners"
         raise InvalidInput(f"image must show a whole chessboard {wanted}, got none")
-    noise = noise_sigma(image) if noise is None else float(noise)
-    return measured(image, grid, max(noise, least_noise(image)))
+    return measured(image, grid, noise)
 
 
 def check_noise(noise: Any) -> None:
@@ -187,9 +186,9 @@ class Squares:
         return bends(grid).reshape(-1, 2)
 
 
-def measured(image: np.ndarray, grid: np.ndarray, noise: float, layout: Layout = Squares()) -> Board:
+def measured(image: np.ndarray, grid: np.ndarray, noise: float | None, layout: Layout = Squares()) -> Board:
     """The corners about ``grid``, shape (rows, columns, ..., 2), px, NaN where one is not seen, under white noise of a
-    standard deviation."""
+    standard deviation, which the image tells where it is None."""
     columns, rows = grid.shape[1::-1]
     toward = layout.steps(grid)
     shape = _started(grid, toward)
@@ -199,7 +198,7 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float, layout: Layout =
         found = layout.windows(image, grid, blur)
         room = found.room
         if not room.any():
-            return _named(_nothing((columns, rows), noise, len(room)), seen)
+            return _named(_nothing((columns, rows), _noise(image, noise), len(room)), seen)
         some, bend = found.some(room), layout.bends(grid)[room] * (turn > 0)
         fitted = fit_crossings(some, shape[room], bend, _FINE if turn else _ROUGH)
         away = np.linalg.norm(fitted.shape[:, :2] - shape[room, :2], axis=1)
@@ -210,7 +209,21 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float, layout: Layout =
         moved = np.nanmax(np.abs(grid - before))
         if turn and moved < _SETTLED:  # windows and bends are those of the corners as they are
             break
+    noise = _noise(image, noise, fitted)
     return _named(_board((columns, rows), room, fitted, noise, _clipped(image, some)), seen)
+
+
+def _noise(image: np.ndarray, given: float | None, fitted: Crossings | None = None) -> float:
+    """Standard deviation of a pixel's noise: given, or told by the image; at least that of rounding.
+
+    What is printed or lies beside the corners makes `noise_sigma` too large. Residuals of crossings do not know of it,
+    but grow where the model fails, so the lesser one is told: a model that fails is seen as it was.
+    """
+    told = given or noise_sigma(image)
+    if given is None and fitted is not None and fitted.converged.any():
+        middle = fitted.square / chdtri(fitted.freedom, 0.5)
+        told = min(told, float(np.sqrt(np.median(middle[fitted.converged]))))
+    return max(float(told), least_noise(image))
 
 
 def respond(image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = Squares()) -> sparse.csr_array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _TRIES = 200
-_SETTLED = 1e-15  # of the squared residuals: what the next step would gain
+_SETTLED = 1e-10  # of chi-square, that a step may still gain: then no estimate is 1e-5 of its sigma off the least
 _WORST = 1e10  # condition number
 _DAMPED, _LESS, _MORE, _MOST = 1e-3, 0.1, 8.0, 1e12
 
@@ -50,7 +50,7 @@ def minimised(
     start: Point,
     allowed: Callable[[np.ndarray], bool],
 ) -> Point:
-    """Least sum of squares by Levenberg and Marquardt's method.
+    """Least sum of squares by Levenberg and Marquardt's method, of residuals in units of their standard deviations.
 
     Parameters
     ----------
@@ -74,7 +74,8 @@ def minimised(
             damping *= _MORE
         else:
             return point
-        settled = gain <= _SETTLED * now
+        # a damped step may gain little far from the least: what one without damping would gain says how far it is
+        settled = gain <= _SETTLED and _step(here, prior, point[0], 0.0)[1] <= _SETTLED
         point, now, damping = ahead, then, max(damping * _LESS, 1e-12)
         if settled:
             break

@@ -53,13 +53,18 @@ def _next(grey: np.ndarray, grid: np.ndarray) -> np.ndarray | None:
     room = 0.5 * size + 2
     if not (np.isfinite(line).all() and (line > room).all() and (line < np.array(grey.shape[::-1]) - 1 - room).all()):
         return None
-    half = max(int(0.3 * size), 2)
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.01)
-    start = np.ascontiguousarray(line[:, None], np.float32)
-    found = cv2.cornerSubPix(grey, start, (half, half), (-1, -1), criteria)[:, 0].astype(float)
+    found = refined(grey, line, size)
     if np.linalg.norm(found - line, axis=1).max() > 0.35 * size:
         return None
     return found if _alternates(grey, grid[-1], found, toward) else None
+
+
+def refined(grey: np.ndarray, corners: np.ndarray, size: float) -> np.ndarray:
+    """Corners (..., 2) px as OpenCV refines them, the least way to the next one being such a size, px."""
+    half = max(int(0.3 * size), 2)
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.01)
+    start = np.ascontiguousarray(corners.reshape(-1, 1, 2), np.float32)
+    return cv2.cornerSubPix(grey, start, (half, half), (-1, -1), criteria).reshape(corners.shape).astype(float)
 
 
 def _alternation(grey: np.ndarray, corners: np.ndarray, toward: np.ndarray) -> np.ndarray:

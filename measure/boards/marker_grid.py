@@ -11,9 +11,8 @@ import numpy as np
 from imaging.boards.windows import Windows, steps, wedges
 from measure.boards.bend import bends_at
 from measure.boards.charuco import check_marker
-from measure.boards.chessboard import Board, check_noise, check_shape, least_noise, measured
+from measure.boards.chessboard import Board, check_noise, check_shape, measured
 from measure.boards.reading import Legible
-from measure.photo.noise import noise_sigma
 from scenes.arrays import picture
 from scenes.board import numbered
 from scenes.errors import InvalidInput
@@ -59,7 +58,6 @@ def marker_grid(
     grid = layout.sorted(_seen(Legible.of(image), known))
     if not np.isfinite(grid).any():
         raise InvalidInput(f"image must show a grid of {columns} x {rows} markers of {dictionary}, got none of them")
-    noise = max(noise_sigma(image) if noise is None else float(noise), least_noise(image))
     return replace(measured(image, grid, noise, layout), marker=float(marker))
 
 

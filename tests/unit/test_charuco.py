@@ -11,6 +11,7 @@ from scipy import stats
 import measure
 from imaging.boards.windows import Marked, windows
 from measure.boards.chessboard import measured
+from measure.photo.noise import noise_sigma
 from scenes import InvalidInput
 from tests.boards import SMALL, poses
 from tests.commands import ice
@@ -72,6 +73,15 @@ def test_covariance_is_that_of_the_corners(seen, images):
     assert low < total < high  # margin: chance, 99 %; 8 seeded pictures
     assert not low < total / 1.5 < high  # margin: 1.5 lies beyond 99 %; 8 seeded pictures
     assert not low < total * 1.5 < high  # margin: 1.5 lies beyond 99 %; 8 seeded pictures
+
+
+def test_noise_that_corners_leave_is_the_pictures(images):
+    """From the image alone; second differences of all of it are 3 % too large."""
+    rng = np.random.default_rng(5)
+    noisy = [image + NOISE * rng.standard_normal(image.shape) for image in images]
+    told = [measure.charuco(image, RIG.board, NAME, SHARE).noise for image in noisy]
+    assert np.mean(told) == pytest.approx(NOISE, rel=0.01)  # 0.001 found
+    assert np.mean([noise_sigma(image) for image in noisy]) > 1.02 * NOISE
 
 
 def test_windows_keep_clear_of_markers():

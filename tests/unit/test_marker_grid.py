@@ -12,6 +12,7 @@ import measure
 from imaging.boards.windows import wedges
 from measure.boards.marker_grid import Markers
 from measure.boards.printed import MARKERS, Printed
+from measure.photo.noise import noise_sigma
 from scenes import InvalidInput
 from tests.boards import SMALL, poses
 from tests.commands import ice
@@ -61,6 +62,14 @@ def test_covariance_is_that_of_the_corners(seen, grids):
     assert low < total < high  # margin: chance, 99 %; 4 seeded pictures
     assert not low < total / 1.4 < high  # margin: 1.4 lies beyond 99 %; 4 seeded pictures
     assert not low < total * 1.4 < high  # margin: 1.4 lies beyond 99 %; 4 seeded pictures
+
+
+def test_noise_that_corners_leave_is_the_pictures(noisy):
+    """With what rounding adds, from the image alone; second differences of all of it are 3 % too large."""
+    true = np.hypot(NOISE, 12**-0.5)
+    told = [measure.marker_grid(image, RIG.board, NAME, SHARE).noise for image in noisy]
+    assert np.mean(told) == pytest.approx(true, rel=0.01)  # 0.004 found
+    assert np.mean([noise_sigma(image) for image in noisy]) > 1.02 * true
 
 
 def test_places_on_the_board(grids):

@@ -11,7 +11,7 @@ import render
 import scenes
 from imaging.boards.seen import crossing, dot
 from imaging.features.measurand import measurands
-from imaging.geometry.projection import camera_frame, sensor_position
+from imaging.geometry.projection import camera_frame, project, sensor_position
 from imaging.models import variance_model
 from imaging.pictures import Pictures
 from imaging.placed import difference, placed
@@ -72,6 +72,38 @@ _BOARD = {"shape": [4, 3], "pitch": 5.0, "corner": [0, 50, 0]}
 def test_what_cannot_be_is_told_in_a_line(changes, says):
     with pytest.raises(InvalidInput, match=says):
         scenes.load("bracket_station").with_(**changes)
+
+
+def _of_a_camera(folder, number):
+    """The block and its board by a camera whose focal length and k1 are estimated: picture, where they are, image."""
+    scene = printed.lenient(printed.estimated(printed.scene(folder, "block"), "focal", "k1"))
+    picture, rng = Picture.of(scene, parts.SENSOR, parts.LIGHT), np.random.default_rng((2, 0, number))
+    there = printed.place(picture, rng)
+    (image,) = render.expose(printed.seen(printed.drawn(picture, rng), there), scene.noise, rng, 1)
+    return picture, there, image
+
+
+def test_a_board_of_which_a_corner_is_taken_for_another_is_found(folder):
+    """OpenCV takes a place on the rim for one of 45 corners; with it, they were 2.5 px off what is plausible."""
+    picture, there, image = _of_a_camera(folder, 22)
+    where = measure.locate(image, picture)
+    assert where.status == "ok", where.reason
+    assert (np.abs(difference(there, where.placement)) < 4 * np.sqrt(np.diag(where.covariance))).all()
+
+
+def test_edges_bent_by_what_is_not_known_of_the_lens_are_no_misfit(folder):
+    """k1 is told 1.75 standard deviations off by the board, which bends edges visibly; a scratch beside one is one."""
+    picture, _, image = _of_a_camera(folder, 8)
+    where = measure.locate(image, picture)
+    told = measure.measure(image, where.picture)
+    assert told.status.tolist() == ["ok"] * 3
+    assert (np.abs(told.value - told.nominal) < 4 * np.hypot(told.sigma, told.u_placed)).all()
+    (x, y), *_ = project(
+        np.array([[25.0, 0.0, 12.0]]), np.array(list(where.picture.sensor)), where.picture.scene.camera
+    )
+    image[round(y) - 1 : round(y) + 2, round(x) - 6 : round(x) + 7] += 20.0
+    scratched = measure.measure(image, measure.locate(image, picture).picture)
+    assert scratched.status.tolist() == ["misfit"] * 3
 
 
 @pytest.mark.parametrize("kind", ["chessboard", "dots"])
