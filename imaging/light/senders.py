@@ -14,12 +14,13 @@ from imaging.light.places import in_unit_square
 from imaging.pictures import Pictures
 from scenes import Picture
 from scenes.lights import GLANCE
+from scenes.parts.rows import different
 from scenes.parts.shading import normals_at
 
 _OF_WAY = 0.5  # of the way to what it sees nearest: the side of a piece
 _FINER, _LOOKS = 4.0, 16  # times smaller than cells it is at most; rays that look for it
 _WITHIN = 0.02  # of the way from a corner to the middle
-_SAME = 1e-6  # of a cell: corners nearer to each other are one
+_SAME = 1e-6  # of a cell, and of a unit normal: corners nearer to each other are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +56,8 @@ def senders(picture: Picture) -> Senders | None:
     exchange = light.exchange
     triangles, faces = _pieces(exchange)
     normals = np.broadcast_to(normals_at(exchange.solid, faces[:, None], triangles), triangles.shape)
-    which, points = _places(triangles, normals, exchange.cell)
-    first = np.unique(which, return_index=True)[1]
-    owners = np.repeat(faces, 3)[first]
-    sent = scene.camera.exposure * light.sent_at(points, owners)
-    return Senders(triangles, normals, faces, sent[which])
+    points, owners, which = _places(triangles, normals, faces, scene.surfaces.kinds, exchange.cell)
+    return Senders(triangles, normals, faces, scene.camera.exposure * light.sent_at(points, owners)[which])
 
 
 def _pieces(exchange: Exchange) -> tuple[np.ndarray, np.ndarray]:
@@ -88,7 +86,8 @@ def _halved(
         turned = (sides[large].argmax(1)[:, None] + np.arange(3)) % 3
         a, b, c = np.moveaxis(np.take_along_axis(triangles[large], turned[:, :, None], 1), 1, 0)
         middle = (a + b) / 2
-        triangles, faces = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)]), np.tile(faces[large], 2)
+        triangles = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
+        faces = np.tile(faces[large], 2)
     found, owners = zip(*done, strict=True)
     return np.concatenate(found), np.concatenate(owners)
 
@@ -102,15 +101,18 @@ def _nearest(exchange: Exchange, points: np.ndarray, faces: np.ndarray) -> np.nd
     return found
 
 
-def _places(triangles: np.ndarray, faces: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places (k, 3) that stand for the corners of triangles (n, 3, 3), their faces (k,), and which each is, (n, 3).
+def _places(
+    triangles: np.ndarray, normals: np.ndarray, faces: np.ndarray, kinds: np.ndarray, cell: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places (k, 3) that stand for the corners of triangles (n, 3, 3), a face of each (k,), and which each is, (n, 3).
 
-    They lie a little within the triangles of one face about them: in an inner edge light comes from both sides.
+    They lie a little within the triangles of one surface about them: in an inner edge light comes from both sides.
     """
     owners = np.repeat(faces, 3)
-    keys = np.column_stack([owners, np.rint(triangles.reshape(-1, 3) / (_SAME * cell))])
-    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    same = np.column_stack([triangles.reshape(-1, 3) / cell, normals.reshape(-1, 3), np.append(kinds, -1.0)[owners]])
+    rows, which = different(np.rint(same / _SAME))
     inner = (triangles + _WITHIN * (triangles.mean(1, keepdims=True) - triangles)).reshape(-1, 3)
-    count = np.bincount(which.ravel())
-    points = np.column_stack([np.bincount(which.ravel(), axis) / count for axis in inner.T])
-    return points, owners[first], which.reshape(-1, 3)
+    points = np.column_stack([np.bincount(which, axis) for axis in inner.T]) / np.bincount(which)[:, None]
+    some = np.zeros(len(rows), int)
+    some[which] = owners
+    return points, some, which.reshape(-1, 3)
