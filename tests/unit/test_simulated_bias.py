@@ -222,7 +222,7 @@ def test_renders_are_enough_when_every_value_s_noise_is_a_tenth_of_sigma_or_a_hu
         picture, quantities=(quantity,) * 2, sources={"rendering": np.array(noise)},
         covariance=np.diag(np.square(sigma)), bias=np.zeros(2),
     )  # fmt: skip
-    assert corrections._is_quiet(made) is quiet
+    assert (corrections._noise(made) <= 1) is quiet
 
 
 def test_lights_are_moved_one_at_a_time():
@@ -301,7 +301,7 @@ class _Rendered(How):
     """A way to make images that are told apart by the seed alone, and that notes what was asked for."""
 
     def image(self, picture, seed=0):
-        more = 1000 * (self.quality.denser - 1)
+        more = 1000 * (self.quality.denser - 1) + 3000 * self.quality.gathered
         return np.full((picture.scene.camera.height, picture.scene.camera.width), float(seed + more))
 
     def active(self, picture):
@@ -312,8 +312,12 @@ class _Rendered(How):
     ("noise", "finer", "count"),
     [(0.0699, None, 1), (0.0701, 0.03, 1), (0.3, 0.0701, 2), (0.3, 0.15, 5), (9.0, 9.0, 6), (np.inf, None, 1)],
 )  # fmt: skip
-def test_as_many_renders_are_measured_as_make_what_is_left_quiet(picture, noise, finer, count, monkeypatch):
-    """Finer ones where a pair is noisy; the worst value counts, six at most; others of as many tell their biases."""
+@pytest.mark.parametrize(("variant", "first"), [("scalar_mono", 3001), ("llvm_ad_mono", 1001)])
+def test_as_many_renders_are_measured_as_make_what_is_left_quiet(
+    picture, noise, finer, count, variant, first, monkeypatch
+):
+    """Finer ones where a pair is noisy; the worst value counts, six at most; others of as many tell their biases, by
+    light that is gathered where it is."""
     asked = []
 
     def correction(images, *given):
@@ -323,14 +327,15 @@ def test_as_many_renders_are_measured_as_make_what_is_left_quiet(picture, noise,
 
     monkeypatch.setattr(measure, "correction", correction)
     whole = np.full((2, 2), 0.5)
-    found = simulation.steadied(picture, whole, Method("gradient"), _Rendered())
+    how = _Rendered(Quality(), variant)
+    found = simulation.steadied(picture, whole, Method("gradient"), how)
     assert found.whole is whole
     if finer is None:
         assert (len(asked), found.measured, found.others[0].flat[0]) == (1, (whole,), 1)
         return
     assert [each.flat[0] for each in found.measured] == [2000 + i for i in range(count)]
-    assert [each.flat[0] for each in found.others] == [1001 + i for i in range(count)]
-    assert [[each.flat[0] for each in pair.renders] for pair in asked] == [[0.5, 1], [2000, 1001]]
+    assert [each.flat[0] for each in found.others] == [first + i for i in range(count)]
+    assert [[each.flat[0] for each in pair.renders] for pair in asked] == [[0.5, 1], [2000, first]]
 
 
 def test_an_image_without_random_light_is_measured_as_it_is(picture, monkeypatch):
@@ -367,7 +372,7 @@ def test_what_is_measured_is_corrected_by_as_many_renders_of_other_rays(picture,
     methods, how = (Method("strip", None), Method("isophote", 0.4)), _Rendered()
     assert simulation.independent(picture, methods, renders, ("one", "two"), how) == (1, 2)
     assert [(given[2], given[3], given[4]) for given in asked] == [("strip", None, "one"), ("isophote", 0.4, "two")]
-    assert asked[0][0] == (picture, renders.others, renders.measured, how.by(*methods))
+    assert asked[0][0] == (picture, renders.others, renders.measured, how.by(*methods).gathering)
 
 
 def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u(small_task1, monkeypatch):

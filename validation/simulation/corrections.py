@@ -52,7 +52,7 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     of sigma or a hundredth of the tolerance, or as many as six if these make it so; else of all rays, and renders of
     other rays are added until it is, six at most.
     """
-    return _simulated(picture, method, how.by(method))
+    return _simulated(picture, method, how.by(method).gathering)
 
 
 def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simulated) -> Correction:

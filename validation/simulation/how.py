@@ -29,7 +29,7 @@ class How:
     ``predicted``: whether the closed form of the bias is that of whatever measures in them.
     """
 
-    quality: Quality = Quality(gathered=True)
+    quality: Quality = Quality()
     variant: str | None = None
     effects: str = "auto"
     tolerance: EffectTolerance = EffectTolerance()
