@@ -93,7 +93,7 @@ def _halved(
 
 
 def _nearest(exchange: Exchange, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """How far what points (n, 3) within faces (n,) see is, where it is nearest, (n,); infinite where that is nothing."""
+    """How far the nearest of what points (n, 3) within faces (n,) see is, (n,); infinite where that is nothing."""
     found, some = np.full(len(points), np.inf), np.flatnonzero(exchange.has[faces])
     normals = exchange.solid.normals[faces[some]]
     met = exchange.met(points[some], normals, _LOOKS, in_unit_square(len(some)))

@@ -94,14 +94,14 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
     method = Method(estimator or measure.best_estimator(scene))
     off = simulation.simulated(picture, method)
     everywhere = off.adjusted is not None or not measure.ESTIMATORS[method.locator].local
-    true, left, noisy = _true(picture, off), [], []
+    (true, own), left, noisy = _true(picture, off), [], []
     for trial in range(trials):
         actual = Picture(deviating(scene, rng), picture.sensor, tuple(moved(pose, rng) for pose in picture.lights))
         clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial, everywhere=everywhere))
         exposed = render.expose(clean, scene.noise, rng, images)
         found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
         away = np.where(is_trusted(found.status), found.value - true, np.nan)
-        beside = np.hypot(_by_inputs(found.u_bias, off), off.beside)
+        beside = np.hypot(_by_inputs(found.u_bias, off), np.hypot(off.sources[RENDERING], own))
         left.append(away[0] / beside[0])
         noisy += list(away[1:] / np.hypot(off.sigma, beside[1:]))
     names = tuple(quantity.name for quantity in scene.quantities)
@@ -109,16 +109,18 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
 
 
 def _by_inputs(u_bias: np.ndarray, off: measure.Correction) -> np.ndarray:
-    """Standard uncertainties (n, M) of biases by all but the renderer's noise: `beside` has that."""
+    """Standard uncertainties (n, M) of biases by all but the renderer's noise."""
     with np.errstate(invalid="ignore"):  # infinite where a value is not measured
         return np.sqrt(np.maximum(u_bias**2 - off.sources[RENDERING] ** 2, 0.0))
 
 
-def _true(picture: Picture, off: measure.Correction) -> np.ndarray:
-    """The object's own values."""
-    clean = render.image(picture, quality=render.Quality(seed=_SEEDS - 1, everywhere=False))
-    found = measure.propagate(clean, picture, estimator=off.estimator).measurands
-    return found.value - found.bias
+def _true(picture: Picture, off: measure.Correction) -> tuple[np.ndarray, np.ndarray]:
+    """The object's own values, and the standard deviations of those in one render by its own noise, (M,) each."""
+    pair = tuple(render.image(picture, quality=render.Quality(seed=_SEEDS - k, everywhere=False)) for k in (1, 2))
+    found = measure.propagate(pair[0], picture, estimator=off.estimator).measurands
+    images = measure.Images(pair, by_pixel=simulation.How().by_pixel)
+    noise = measure.correction(images, picture, off.estimator, off.threshold).sources[RENDERING]
+    return found.value - found.bias, np.sqrt(2) * noise
 
 
 def _pictures(names: list[str], poses: int) -> Iterator[Picture]:
