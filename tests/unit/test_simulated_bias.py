@@ -338,6 +338,20 @@ def test_as_many_renders_are_measured_as_make_what_is_left_quiet(
     assert [[each.flat[0] for each in pair.renders] for pair in asked] == [[0.5, 1], [2000, first]]
 
 
+@pytest.mark.parametrize(
+    ("active", "everywhere", "gathered"),
+    [
+        ({"interreflection", "shadows"}, False, True), ({"interreflection", "shadows"}, True, False),
+        ({"light_size"}, False, False), ({"light_size", "interreflection"}, False, False),
+    ],
+)  # fmt: skip
+def test_more_rays_make_quieter_what_is_not_gathered(picture, active, everywhere, gathered, monkeypatch):
+    """Light of some size is none that patches tell, with light between faces or without."""
+    monkeypatch.setattr(_Rendered, "active", lambda how, picture: frozenset(active))
+    quieter = _Rendered(Quality(), "scalar_mono", everywhere=everywhere).quieter(picture)
+    assert (quieter.quality.gathered, quieter.quality.denser) == ((True, 1) if gathered else (False, 2))
+
+
 def test_an_image_without_random_light_is_measured_as_it_is(picture, monkeypatch):
     monkeypatch.setattr(_Rendered, "active", lambda how, picture: frozenset({"shadows"}))
     monkeypatch.setattr(measure, "correction", None)

@@ -10,6 +10,7 @@ import measure
 import render
 from render import EffectTolerance, Quality
 from render import variant as variants
+from render.build import MANY_WAYS
 from render.gathered import is_gathered
 from render.large import LARGE
 from scenes import Picture
@@ -70,7 +71,8 @@ class How:
 
     def quieter(self, picture: Picture) -> How:
         """With light between faces gathered, or with four times the rays where it is not."""
-        gathers = self.by_pixel and not self.everywhere and is_gathered(picture.scene)
+        alone = self.active(picture) & MANY_WAYS == {BETWEEN}
+        gathers = alone and self.by_pixel and not self.everywhere and is_gathered(picture.scene)
         return self.gathering if gathers else self.finer
 
     @property
