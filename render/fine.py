@@ -174,10 +174,9 @@ class _Tracer:
         some = self.random and (apart or not self.quality.everywhere)
         return some or is_large(self.crop, self.quality.supersample, self.random)
 
-    @cached_property
-    def rays(self) -> Rays:
-        """Of a compiled variant."""
-        bounces = SURFACES - 1 if "interreflection" in self.active else 0
+    def rays(self, active: frozenset[str]) -> Rays:
+        """Of a compiled variant, with some effects."""
+        bounces = SURFACES - 1 if "interreflection" in active else 0
         at_once = LARGE_AT_ONCE if self.is_large else AT_ONCE
         most, quality = max(self.few, self.many), self.quality
         return Rays(
@@ -210,20 +209,20 @@ class _Tracer:
         pixels = np.zeros(tuple(part.stop - part.start for part in self.film(divided)[1]))
         everywhere = np.ones(pixels.shape, bool)
         if not self.scalar:
-            return refine(loaded, self.rays, pixels, everywhere, rays)
+            return refine(loaded, self.rays(active), pixels, everywhere, rays)
         tiles = replace(self._tiles(loaded, active, rays, divided), roughly=True)
         return tiles.rendered(pixels, everywhere, rays, (self.quality.seed, 3))
 
     def again(self, loaded: Any, active, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
         """The image with marked fine pixels rendered again; in scalar variants also what turns out to be crossed."""
         if not self.scalar:
-            return refine(loaded, self.rays, fine, marked, rays)
+            return refine(loaded, self.rays(active), fine, marked, rays)
         return self._tiles(loaded, active, rays).refined(fine, marked, rays, self.quality.seed)
 
     def again_alone(self, loaded: Any, active, fine: np.ndarray, marked: np.ndarray, rays: int) -> np.ndarray:
         """The image with marked fine pixels rendered again, and no others."""
         if not self.scalar:
-            return refine(loaded, self.rays, fine, marked, rays)
+            return refine(loaded, self.rays(active), fine, marked, rays)
         return self._tiles(loaded, active, rays).rendered(fine, marked, rays, (self.quality.seed, 0))
 
     def _tiles(self, loaded: Any, active, rays: int, divided: int = 1, sampler: str | None = None) -> Tiles:
@@ -248,7 +247,7 @@ class _Tracer:
         where = np.ones(pixels.shape, bool) if where is None else where
         if self.scalar:
             return self._tiles(loaded, active, count, k).rendered(pixels, where, count, (self.quality.seed, 4))
-        return refine(loaded, self.rays, pixels, where, count)
+        return refine(loaded, self.rays(active), pixels, where, count)
 
     def bounced(self, near: np.ndarray, count: int) -> np.ndarray:
         """What surfaces send to each other: with it less without it, of the same rays; whole pixels."""
@@ -308,7 +307,7 @@ class _Tracer:
         if self.scalar:
             fine = self.rendered(loaded, self.active, self.few)
         else:
-            fine = refine(loaded, self.rays, fine, everywhere, self.few)
+            fine = refine(loaded, self.rays(self.active), fine, everywhere, self.few)
         if self.quiet:
             fine = self.again(loaded, self.active, fine, near & ~marked, min(_NEAR * self.quality.denser**2, self.many))
         else:

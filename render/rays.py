@@ -109,34 +109,49 @@ class Rays:
         """Light that comes along rays, the light itself left out: from the first surface, and by way of others."""
         import drjit as dr
 
-        mi, context = self.mitsuba, self.mitsuba.BSDFContext()
-        total, passed = dr.zeros(mi.Float, dr.width(point)), mi.Float(1.0)
         hit = scene.ray_intersect(ray)
         if self.shown:
             return hit.emitter(scene).eval(hit)[0]
-        for bounce in range(self.bounces + 1):
-            alive, column = hit.is_valid(), 2 + _DIMENSIONS * bounce
-            surface = hit.bsdf(ray)
-            light, arriving = scene.sample_emitter_direction(hit, self._pair(point, column), True, alive)
-            lit = alive & (light.pdf != 0)
-            total += passed * (surface.eval(context, hit, hit.to_local(light.d), lit) * arriving)[0]
-            if bounce < self.bounces:
-                sent, value = surface.sample(context, hit, 0.5, self._pair(point, column + 2), alive)
-                passed *= value[0]
-                ray = hit.spawn_ray(hit.to_world(sent.wo))
-                hit = scene.ray_intersect(ray, alive & (passed > 0))
-        return total
+        mi = self.mitsuba
+        first = self._reflected(scene, ray, hit, point, mi.UInt32(2))
+        if not self.bounces:
+            return first
 
-    def _pair(self, point, column: int):
-        """Two columns of the table."""
+        def onward(alive, bounce, ray, hit, passed, total):
+            column = 2 + _DIMENSIONS * bounce
+            surface, numbers = hit.bsdf(ray), self._pair(point, column + 2)
+            sent, value = surface.sample(mi.BSDFContext(), hit, 0.5, numbers, alive)
+            passed = passed * value[0]
+            ray = hit.spawn_ray(hit.to_world(sent.wo))
+            hit = scene.ray_intersect(ray, alive & (passed > 0))
+            total = total + passed * self._reflected(scene, ray, hit, point, column + _DIMENSIONS)
+            return hit.is_valid() & (bounce + 1 < self.bounces), bounce + 1, ray, hit, passed, total
+
+        start = hit.is_valid(), mi.UInt32(0), ray, hit, mi.Float(1.0), first  # compiled once for all bounces
+        return dr.while_loop(start, lambda alive, *_: alive, onward)[-1]
+
+    def _reflected(self, scene, ray, hit, point, column):
+        """What the surfaces that rays meet send back of a light's; numbers from a column of the table on."""
+        alive = hit.is_valid()
+        light, arriving = scene.sample_emitter_direction(hit, self._pair(point, column), True, alive)
+        lit = alive & (light.pdf != 0)
+        return (hit.bsdf(ray).eval(self.mitsuba.BSDFContext(), hit, hit.to_local(light.d), lit) * arriving)[0]
+
+    def _pair(self, point, column):
+        """Two columns of the table, the first of them as it may differ from ray to ray."""
         import drjit as dr
 
-        mi = self.mitsuba
-        return mi.Point2f(*(dr.gather(mi.Float, mi.Float(self._table[column + i]), point) for i in range(2)))
+        mi, length = self.mitsuba, self._table.shape[1]
+        return mi.Point2f(*(dr.gather(mi.Float, self._numbers, (column + i) * length + point) for i in range(2)))
 
     @property
     def _block(self) -> int:
         return 1 << math.ceil(math.log2(self.most))
+
+    @cached_property
+    def _numbers(self):
+        """The table on the variant's device, one column after the other."""
+        return self.mitsuba.Float(self._table.ravel())
 
     @cached_property
     def _table(self) -> np.ndarray:

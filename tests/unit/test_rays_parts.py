@@ -70,12 +70,20 @@ class Traced(Rays):
         return point.astype(float)
 
 
+def looped(state, condition, body):
+    """What Dr.Jit records once and repeats while any ray goes on."""
+    while np.any(condition(*state)):
+        state = body(*state)
+    return state
+
+
 @pytest.fixture
 def numpy_for_drjit(monkeypatch):
     """NumPy in the place of a compiled variant's arrays."""
     module = ModuleType("drjit")
     module.arange = lambda kind, count: np.arange(count)
     module.gather = lambda kind, values, index: values[index]
+    module.while_loop = looped
     module.block_sum = lambda values, size: values.reshape(-1, size).sum(1)
     monkeypatch.setitem(sys.modules, "drjit", module)
     seeded = {}
@@ -107,6 +115,8 @@ def test_each_fine_pixel_is_crossed_in_all_its_strata(numpy_for_drjit):
     assert lens.place.y == pytest.approx(y.ravel())
     assert (np.array(lens.aperture) == rays._table[:2, points]).all()
     assert (np.array(rays._pair(points, 6)) == rays._table[6:8, points]).all()
+    columns = np.arange(len(points)) % 5  # each ray's own
+    assert (np.array(rays._pair(points, columns))[1] == rays._table[columns + 1, points]).all()
 
 
 class Met:

@@ -93,8 +93,10 @@ def test_the_table_of_random_numbers_is_of_the_most_rays(edge, elsewhere):
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
     quality = Quality(edge_samples=edge, random_samples=elsewhere)
     part, crop = Part(picture, frozenset({"interreflection"})), (slice(0, 16), slice(0, 16))
-    rays = fine._Tracer(part, crop, quality, None, False).rays
-    assert (rays.most, rays.bounces) == (64, fine.SURFACES - 1)
+    tracer = fine._Tracer(part, crop, quality, None, False)
+    with_light_between, direct = tracer.rays(part.active), tracer.rays(frozenset())
+    assert (with_light_between.most, with_light_between.bounces) == (64, fine.SURFACES - 1)
+    assert (direct.most, direct.bounces) == (64, 0)  # else direct light would have its noise
 
 
 def test_the_object_of_a_plan_is_drawn_whole_and_from_behind():
