@@ -1,6 +1,7 @@
 """Rays of single fine pixels, traced as one array in a compiled variant of Mitsuba.
 
-Where a ray goes within its fine pixel is random and independent. All that is random behind that (place on the aperture
+Where a ray goes within its fine pixel is random and independent, and the same wherever that pixel is traced: two
+renders that mark different pixels have the same rays in those that they share. All that is random behind that (place on the aperture
 and on the light, directions of reflected light) is the same in every pixel: a table of low-discrepancy points, of which
 each fine pixel of a pixel has its own block. What such a table gets wrong it gets wrong nearly alike on both sides of
 an edge and all along it, and in two renders of the same seed that differ in an effect.
@@ -75,10 +76,10 @@ class Rays:
         """
         share = max(self.at_once // samples, 1)
         parts = [slice(first, first + share) for first in range(0, rows.size, share)]
-        found = [self._part(scene, rows[part], columns[part], shape, samples, part.start) for part in parts]
+        found = [self._part(scene, rows[part], columns[part], shape, samples) for part in parts]
         return np.concatenate(found) if found else np.zeros(0)
 
-    def _part(self, scene, rows, columns, shape, samples: int, start: int) -> np.ndarray:
+    def _part(self, scene, rows, columns, shape, samples: int) -> np.ndarray:
         import drjit as dr
 
         mi, k, side = self.mitsuba, self.supersample, math.isqrt(samples)
@@ -91,12 +92,11 @@ class Rays:
         ))  # fmt: skip
         stratum = dr.gather(mi.UInt32, mi.UInt32(self._strata(samples)), cell * samples + number)
         point = cell * self._block + number
-        sampler = mi.load_dict({"type": "independent"})
-        sampler.seed(self.seed + 1 + start, rows.size * samples)
-        jitter = sampler.next_2d()
+        own, _ = mi.sample_tea_32(mi.UInt32(x) + shape[1] * mi.UInt32(y), dr.opaque(mi.UInt32, self.seed))
+        across, down = (mi.Float(each >> 8) * 2.0**-24 for each in mi.sample_tea_32(own, number))
         place = mi.Point2f(
-            (x + (mi.Float(stratum % side) + jitter.x) / side) / shape[1],
-            (y + (mi.Float(stratum // side) + jitter.y) / side) / shape[0],
+            (x + (mi.Float(stratum % side) + across) / side) / shape[1],
+            (y + (mi.Float(stratum // side) + down) / side) / shape[0],
         )
         if self.sight is None:
             ray, weight = scene.sensors()[0].sample_ray(0.0, 0.5, place, self._pair(point, 0))

@@ -1,6 +1,7 @@
 """Random numbers of the rays, and how many are traced at once, without a compiled variant."""
 
 import sys
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 from typing import NamedTuple
 
@@ -14,9 +15,8 @@ from render.rays import SURFACES, Rays
 class Counted(Rays):
     """Whose parts say which fine pixels they were asked for."""
 
-    def _part(self, scene, rows, columns, shape, samples, start):
+    def _part(self, scene, rows, columns, shape, samples):
         assert rows.size * samples <= max(self.at_once, samples)
-        assert (rows == np.arange(start, start + rows.size)).all()
         return 1000.0 * rows + columns
 
 
@@ -86,37 +86,47 @@ def numpy_for_drjit(monkeypatch):
     module.while_loop = looped
     module.block_sum = lambda values, size: values.reshape(-1, size).sum(1)
     monkeypatch.setitem(sys.modules, "drjit", module)
-    seeded = {}
 
-    def seed(number, count):
-        seeded["seed"], seeded["count"] = number, count
+    def mixed(first, second):  # in the place of its cipher: two numbers of 32 bits
+        first, second = (np.asarray(each, np.uint64) for each in np.broadcast_arrays(first, second))
+        return tuple((factor * (3 * first + 7919 * second + 1)) % 2**32 for factor in (2654435761, 2246822519))
 
-    def jitter():
-        return Place(np.full(seeded["count"], 0.25), np.full(seeded["count"], 0.75))
-
-    sampler = SimpleNamespace(seed=seed, next_2d=jitter)
-    mitsuba = SimpleNamespace(UInt32=np.asarray, Float=np.asarray, Point2f=Place, load_dict=lambda _: sampler)
-    return SimpleNamespace(mitsuba=mitsuba, seeded=seeded)
+    module.opaque = lambda kind, value: kind(value)
+    return SimpleNamespace(UInt32=np.asarray, Float=np.asarray, Point2f=Place, sample_tea_32=mixed)
 
 
 def test_each_fine_pixel_is_crossed_in_all_its_strata(numpy_for_drjit):
     """Of a crop of 5 rows and 8 columns; a pixel has 2 x 2 fine ones, each with a block of 16 points of the table."""
-    rays, lens = Traced(numpy_for_drjit.mitsuba, 2, 9, 0, 11), Lens()
+    rays, lens = Traced(numpy_for_drjit, 2, 9, 0, 11), Lens()
     rows, columns = np.array([0, 3, 4]), np.array([7, 2, 5])
-    found = rays._part(SimpleNamespace(sensors=lambda: [lens]), rows, columns, (5, 8), 4, 40)
+    scene = SimpleNamespace(sensors=lambda: [lens])
+    found = rays._part(scene, rows, columns, (5, 8), 4)
     cells = np.array([1, 2, 1])  # of their pixels: row and column are even or odd
     points = (16 * cells[:, None] + np.arange(4)).ravel()
     assert found == pytest.approx(2 * (16 * cells + 1.5))
-    assert numpy_for_drjit.seeded == {"seed": 11 + 1 + 40, "count": 12}
     strata = rays._strata(4).reshape(4, 4)[cells]
-    x = (columns[:, None] + (strata % 2 + 0.25) / 2) / 8
-    y = (rows[:, None] + (strata // 2 + 0.75) / 2) / 5
-    assert lens.place.x == pytest.approx(x.ravel())
-    assert lens.place.y == pytest.approx(y.ravel())
+    across = 2 * (8 * lens.place.x.reshape(3, 4) - columns[:, None]) - strata % 2
+    down = 2 * (5 * lens.place.y.reshape(3, 4) - rows[:, None]) - strata // 2
+    within = np.stack([across, down])
+    assert (within >= 0).all() and (within < 1).all()  # margin: of a stratum
+    assert len(np.unique(within.round(9))) == within.size
     assert (np.array(lens.aperture) == rays._table[:2, points]).all()
     assert (np.array(rays._pair(points, 6)) == rays._table[6:8, points]).all()
     columns = np.arange(len(points)) % 5  # each ray's own
     assert (np.array(rays._pair(points, columns))[1] == rays._table[columns + 1, points]).all()
+
+
+def test_a_fine_pixel_has_the_same_rays_whichever_others_are_traced(numpy_for_drjit):
+    """So that two renders differ by what differs between them; another seed's are others."""
+    lens, shape = Lens(), (5, 8)
+    scene, rows, columns = SimpleNamespace(sensors=lambda: [lens]), np.array([0, 3, 4]), np.array([7, 2, 5])
+
+    def places(seed, *which):
+        Traced(numpy_for_drjit, 2, 9, 0, seed)._part(scene, rows[list(which)], columns[list(which)], shape, 4)
+        return np.stack(lens.place).reshape(2, len(which), 4)
+
+    assert (places(11, 0, 1, 2)[:, 1:] == places(11, 1, 2)).all()
+    assert (places(11, 0, 1, 2) != places(12, 0, 1, 2)).all()
 
 
 class Met:
@@ -156,7 +166,7 @@ def test_light_by_way_of_each_surface_and_numbers_of_their_own(bounces, numpy_fo
     """What is reflected at each, weakened by all before it; no two numbers of a ray are of one column of the table."""
     module = sys.modules["drjit"]
     module.zeros, module.width = lambda kind, count: np.zeros(count), len
-    mitsuba = numpy_for_drjit.mitsuba
+    mitsuba = numpy_for_drjit
     mitsuba.BSDFContext = lambda: None
     mitsuba.Float = lambda values: np.float64(values) if np.isscalar(values) else np.asarray(values)
     rays, scene = Rays(mitsuba, 2, 9, bounces, 11), Met([(0.7, 0.5), (0.2, 0.3), (0.11, 0.9)], 0, [])
