@@ -1,10 +1,10 @@
 """Rays of single fine pixels, traced as one array in a compiled variant of Mitsuba.
 
 Where a ray goes within its fine pixel is random and independent, and the same wherever that pixel is traced: two
-renders that mark different pixels have the same rays in those that they share. All that is random behind that (place on the aperture
-and on the light, directions of reflected light) is the same in every pixel: a table of low-discrepancy points, of which
-each fine pixel of a pixel has its own block. What such a table gets wrong it gets wrong nearly alike on both sides of
-an edge and all along it, and in two renders of the same seed that differ in an effect.
+renders that mark different pixels have the same rays in those that they share. All that is random behind that (place
+on the aperture and on the light, directions of reflected light) is the same in every pixel: a table of low-discrepancy
+points, of which each fine pixel of a pixel has its own block. What such a table gets wrong it gets wrong nearly alike
+on both sides of an edge and all along it, and in two renders of the same seed that differ in an effect.
 """
 
 from __future__ import annotations
