@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from planner.budgeting.budgets import SceneBudget, budget
     from planner.budgeting.bundles import BundleBudget, bundle_budget
     from planner.budgeting.plans import CapabilityPlan, plan_capability
+    from planner.bundle_plans import BundlePlan, BundleSet, plan_bundle
     from planner.bundles import BundlePrediction, predict_bundle
     from planner.certifying.certificate import Certificate, certified
     from planner.certifying.installation import InstallationBox, installation_box
@@ -40,6 +41,7 @@ _LATER = {
     "BoardPlan": "board_places", "place_board": "board_places",
     "BundleBudget": "budgeting.bundles", "SceneBudget": "budgeting.budgets", "budget": "budgeting.budgets",
     "bundle_budget": "budgeting.bundles", "CapabilityPlan": "budgeting.plans", "plan_capability": "budgeting.plans",
+    "BundlePlan": "bundle_plans", "BundleSet": "bundle_plans", "plan_bundle": "bundle_plans",
     "BundlePrediction": "bundles", "predict_bundle": "bundles",
     "Certificate": "certifying.certificate", "certified": "certifying.certificate",
     "InstallationBox": "certifying.installation", "installation_box": "certifying.installation",
@@ -51,7 +53,9 @@ __all__ = [
     "Aim",
     "BoardPlan",
     "BundleBudget",
+    "BundlePlan",
     "BundlePrediction",
+    "BundleSet",
     "Candidate",
     "CapabilityPlan",
     "Certificate",
@@ -86,6 +90,7 @@ __all__ = [
     "installation_box",
     "place_board",
     "plan",
+    "plan_bundle",
     "plan_capability",
     "plan_views",
     "pose_map",

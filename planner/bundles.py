@@ -12,12 +12,11 @@ from imaging.bundles.biases import FeatureBias, corrected, covariances
 from imaging.bundles.bundle import Bundle
 from imaging.bundles.preferred import Preferred
 from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
-from imaging.features.circles import LEAST_SEEN
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
 from imaging.models.bias import cluttered
 from imaging.models.errors import Errors
 from imaging.pictures import Pictures
-from planner.ranks import edge_ranks
+from planner.ranks import feature_ranks
 from scenes import InvalidInput, Picture, Quantity, status
 from scenes.results import Shown, finite
 
@@ -144,7 +143,9 @@ def predict_bundle(
     each = [variance_model(model)(Pictures.of(picture)) for picture in bundle.pictures]
     noise = [errors.of_features for errors in each]
     if biases is None:
-        states = [_states(errors, picture, close=close) for errors, picture in zip(each, bundle.pictures, strict=True)]
+        states = [
+            states_of(errors, picture, close=close) for errors, picture in zip(each, bundle.pictures, strict=True)
+        ]
         chosen = Preferred.of(bundle, noise, states)
         said, doubts = chosen.statuses(states), None
     else:
@@ -185,14 +186,8 @@ def _corrected(
     return chosen, corrected(chosen.statuses(states), u_bias, sigma, bundle.quantities)
 
 
-def _states(errors: Errors, picture: Picture, *, close: bool) -> np.ndarray:
-    """Status of each edge and circle of one picture, (E + C,)."""
-    known = errors.measurands
-    clutter = cluttered(Pictures.of(picture)) if close else np.zeros(len(known.view.names), bool)
-    edges = [status.WORST_FIRST[rank] for rank in edge_ranks(errors, clutter)]
-    rims = []
-    for covariance, left, crowded in zip(errors.circles, errors.left, errors.crowded, strict=True):
-        seen = np.isfinite(np.diag(covariance)).all()
-        rims.append(status.SHORT if left < LEAST_SEEN else status.NOT_VISIBLE if not seen else
-                    status.CLUTTER if crowded else status.OK)  # fmt: skip
-    return np.array([*edges, *rims])
+def states_of(errors: Errors, picture: Picture, *, close: bool) -> np.ndarray:
+    """Status of each edge and circle of one picture, (E + C,); ``close``: biases are looked for."""
+    names = errors.measurands.view.names
+    clutter = cluttered(Pictures.of(picture)) if close else np.zeros(len(names), bool)
+    return np.array([status.WORST_FIRST[rank] for rank in feature_ranks(errors, clutter)])

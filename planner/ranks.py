@@ -39,6 +39,16 @@ def edge_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
     return np.select([hidden, short, weak, clutter], [_NOT_VISIBLE, _SHORT, _LOW_CONTRAST, _CLUTTER], _OK)
 
 
+def feature_ranks(evaluated: Errors, clutter: np.ndarray) -> np.ndarray:
+    """The same of each straight edge and circle, (..., E + C), for pictures that are adjusted together."""
+    edges, rims = edge_ranks(evaluated, clutter), []
+    for covariance, left, crowded in zip(evaluated.circles, evaluated.left, evaluated.crowded, strict=True):
+        lost = ~np.isfinite(np.einsum("...ii->...i", covariance)).all(-1)
+        rank = np.select([left < LEAST_SEEN, lost, crowded], [_SHORT, _NOT_VISIBLE, _CLUTTER], _OK)
+        rims.append(np.broadcast_to(rank, edges.shape[:-1]))
+    return np.concatenate([edges, np.stack(rims, -1)], -1) if rims else edges
+
+
 def least_contrast(evaluated: Errors) -> np.ndarray:
     """The contrast at which an edge is ``low_contrast``, grey levels, shape (..., E)."""
     return MIN_CONTRAST * np.sqrt(evaluated.noise_variance)

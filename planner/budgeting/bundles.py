@@ -139,7 +139,8 @@ def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[So
 
 
 def _terms(told: BundlePrediction) -> list[list[Term]]:
-    """Of each quantity noise, model error, what is known before, fixed pattern, rounding, temperature."""
+    """Of each quantity noise, model error, what is known before, fixed pattern, rounding, temperature; nothing of one
+    that is not told."""
     scene, pattern = told.pictures[0].scene, np.zeros(len(told.quantities))
     if scene.uncertainty.fixed_pattern and (scene.noise.prnu or scene.noise.dsnu):
         each = [Pictures.of(picture) for picture in told.pictures]
@@ -151,6 +152,9 @@ def _terms(told: BundlePrediction) -> list[list[Term]]:
     found = []
     for m, unit in enumerate(told.units):
         noise = float(told.sigma[m])
+        if not np.isfinite(noise):
+            found.append([])
+            continue
         rows = [Term(NOISE, 0.0, Uncertain(sd=noise, type="A"), unit, 1.0, "noise")]
         if told.doubts is None:
             rows.append(Term(MODEL, 0.0, Uncertain(half_width=MOST * noise), unit, 1.0))

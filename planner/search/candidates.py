@@ -35,7 +35,7 @@ from scenes.uncertain import Uncertain
 
 DEAREST = 4.0  # times the least variance that is paid for trust: standard deviations are twice as large
 AROUND = 0.2  # degrees: how far off everything has to be measurable, at least
-_STEEPEST = 4.0  # times the variance that is lost by standing so far off: standard deviations are twice as large
+STEEPEST = 4.0  # times the variance that is lost by standing so far off: standard deviations are twice as large
 _SHELLS = (0.4, 0.8, 1.6, 3.2)  # degrees from an optimum that cannot be set up
 _PLACES, _SEED = 64, 1  # of each shell
 _DOUBTFUL = WORST_FIRST.index(status.CLUTTER)  # what is measured, though it may be biased
@@ -280,15 +280,15 @@ class SettingUp:
 
     def is_steady(self, sensor: np.ndarray, lights: np.ndarray) -> bool:
         """Whether all is measurable there and around it, with a variance not more than four times as large."""
-        sensors, places = self._around(sensor, lights)
+        sensors, places = self.around(sensor, lights)
         values = self.problem.values(sensors, places)
-        return bool(_measurable(self.problem.errors(sensors, places)).all() and values.max() <= _STEEPEST * values[0])
+        return bool(_measurable(self.problem.errors(sensors, places)).all() and values.max() <= STEEPEST * values[0])
 
     def steady(self, sensor: np.ndarray, lights: np.ndarray) -> np.ndarray:
         """The same of each quantity, for one picture of several need not measure all; bool, shape (M,)."""
-        errors = self.problem.errors(*self._around(sensor, lights))
+        errors = self.problem.errors(*self.around(sensor, lights))
         variances = errors.variances_object
-        return _measurable(errors).all(0) & (variances.max(0) <= _STEEPEST * variances[0])
+        return _measurable(errors).all(0) & (variances.max(0) <= STEEPEST * variances[0])
 
     def to_digits(self, sensors: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Settings (n, 2) and (n, 2 F) to the digits of poses, where that keeps the constraints; what is held stays."""
@@ -312,7 +312,7 @@ class SettingUp:
         moves = radius * ways / np.linalg.norm(ways, axis=1, keepdims=True)
         return self._kept(sensor, lights, *map(rounded, _moved(sensor, lights, moves)))
 
-    def _around(self, sensor: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def around(self, sensor: np.ndarray, lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The setting itself, then sensor and lights off by what is to be borne, one by one and together."""
         own, others = (how_far(self.problem.scene, role) for role in ("sensor", "light"))
         size = np.array([own, own, *[others] * lights.size])

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, islice
+from typing import Protocol
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from scenes.status import is_trusted
 MOST_SETS = 200_000  # that are tried one by one
 _CHUNK = 20_000
 _BLOCK = 4096  # pictures compared at a time with those that are kept
-_SEEDS, _SMALL = 64, 4  # pictures, of them all and of a set, that are few enough to begin it with each of them
+SEEDS, SMALL = 64, 4  # pictures, of them all and of a set, that are few enough to begin it with each of them
 _GROUPS = 24  # places of what is shared that are searched on
 _ALIKE = 15.0  # degrees: beside a picture with clutter, what is clutter there is taken to be so until it is traced
 _SIZES = (0.7, 0.15)  # grid steps: of the first simplex of a local search
@@ -105,7 +106,19 @@ class Score:
         return int(self.lost.flat[index]), float(self.value.flat[index]), float(self.whole.flat[index])
 
 
-def better(one: tuple[int, float, float], other: tuple[int, float, float]) -> bool:
+class Table(Protocol):
+    """What is known of P pictures, and how good sets of them are."""
+
+    def __len__(self) -> int: ...
+
+    def of_sets(self, members: np.ndarray) -> Score:
+        """Of sets of pictures, indices (..., K)."""
+
+    def with_each(self, members: tuple[int, ...]) -> Score:
+        """Of a set and each of the P as one more."""
+
+
+def better(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
     """Whether one set's score is clearly less than another's."""
     if one[0] != other[0]:
         return one[0] < other[0]
@@ -146,7 +159,7 @@ def greedy(table: PictureInformation, count: int) -> tuple[tuple[int, ...], ...]
     pictures. So none is worse than the one before with a picture repeated.
     """
     best = [(int(row),) for row in np.unique(table.ok.argmax(0))]
-    each = [(row,) for row in range(len(table))] if len(table) <= _SEEDS else best
+    each = [(row,) for row in range(len(table))] if len(table) <= SEEDS else best
     told = np.maximum(table.ok, table.clutter / DEAREST)
     parts = _relaxed(told[:, told.any(0)], table.over)[1]
     chosen: list[tuple[int, ...]] = []
@@ -154,20 +167,21 @@ def greedy(table: PictureInformation, count: int) -> tuple[tuple[int, ...], ...]
         whole = tuple(
             int(row) for row in np.repeat(np.arange(len(table)), np.floor(size * parts + 1e-9).astype(int))[:size]
         )
-        starts = [chosen[-1] if chosen else (), whole, *(each if size <= _SMALL else best)]
-        tried = [_exchanged(table, _filled(table, start, size)) for start in starts]
+        starts = [chosen[-1] if chosen else (), whole, *(each if size <= SMALL else best)]
+        tried = [exchanged(table, filled(table, start, size)) for start in starts]
         score = table.of_sets(np.array(tried))
         chosen.append(tuple(sorted(tried[score.best()])))
     return tuple(chosen)
 
 
-def _filled(table: PictureInformation, members: tuple[int, ...], size: int) -> tuple[int, ...]:
+def filled(table: Table, members: tuple[int, ...], size: int) -> tuple[int, ...]:
+    """With the best picture more, one at a time, up to a size."""
     while len(members) < size:
         members = (*members, table.with_each(members).best())
     return members
 
 
-def _exchanged(table: PictureInformation, members: tuple[int, ...]) -> tuple[int, ...]:
+def exchanged(table: Table, members: tuple[int, ...]) -> tuple[int, ...]:
     """One picture at a time is exchanged for the best other one until none makes the set better."""
     here = table.of_sets(np.array(members)).at(0)
     moved = True
@@ -191,10 +205,10 @@ def sets_of(pictures: int, count: int) -> int:
     return math.comb(pictures + count - 1, count)
 
 
-def every_set(table: PictureInformation, count: int) -> tuple[int, ...]:
+def every_set(table: Table, count: int) -> tuple[int, ...]:
     """The best of all sets of ``count`` pictures, tried one by one."""
     best: tuple[int, ...] = ()
-    least = (len(table.ok[0]) + 1, math.inf, math.inf)
+    least: tuple[float, float, float] = (math.inf, math.inf, math.inf)
     for members in _chunks(combinations_with_replacement(range(len(table)), count)):
         score = table.of_sets(members)
         index = score.best()

@@ -32,6 +32,7 @@ ASKED = {  # the least work of each command; by the heading of docs/json.md wher
     "validate": ("short.toml", "--renders", "60", "--workers", "1", "--out", "run"),
     "plan": ("small.toml", "--step", "15", "--check", "2"),
     "plan --views": ("small.toml", "--step", "30", "--views", "2", "--no-check"),
+    "plan --views --together": ("small.toml", "--step", "30", "--views", "2", "--together", "known"),
     "plan --coverage": ("small.toml", "--coverage", "--step", "30"),
     "plan --objective capability": ("calibrated_rig", "--objective", "capability", "--step", "45"),
     "render": ("small.toml", *POSES, "-o", "b.png"),

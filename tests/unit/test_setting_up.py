@@ -140,7 +140,7 @@ def test_sensor_and_lights_are_moved_by_what_each_may_be_off():
     cliff = Cliff()
     cliff.scene = scenes.load("two_lights").with_(uncertainty={"sensor_deg": 0.3, "light_deg": 0.25})
     places = np.array([40.0, 10.0, 60.0, 200.0])
-    sensors, lights = SettingUp(cliff, (False, False))._around(np.array([50.0, 100.0]), places)
+    sensors, lights = SettingUp(cliff, (False, False)).around(np.array([50.0, 100.0]), places)
     there = (sensors, [50, 100]), (lights[:, :2], [40, 10]), (lights[:, 2:], [60, 200])
     off = np.degrees([_apart(each, here) for each, here in there]).T
     assert off[0] == pytest.approx(0)

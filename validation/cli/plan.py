@@ -38,7 +38,7 @@ _CHECKED, _MOST_CHECKED = 10, 1000
 _QUICK_PIXELS = 1 << 20  # of a picture that is rendered in a second or so
 _NOT_CAPABILITY = (
     "--over", "--search", "--model", "--edges", "--start", "--shares", "--tolerance", "--check", "--map", "--out",
-    "--views", "--views-share", "--vary", "--hold", "--write", "--certify", "--place-board",
+    "--views", "--views-share", "--together", "--vary", "--hold", "--write", "--certify", "--place-board",
 )  # fmt: skip
 _NOT_COVERAGE = tuple(each for each in _NOT_CAPABILITY if each != "--model")
 
@@ -146,12 +146,19 @@ class Options:
     views_share: Annotated[
         str | None, typer.Option(help="With --views: sensor or light, the same in all pictures.")
     ] = None
+    together: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SENSORS",
+            help="With --views: adjust the pictures together; sensors' places are known, uncertain or unknown.",
+        ),
+    ] = None
     as_json: Json = False
 
     @property
     def several(self) -> bool:
         """Whether several pictures are planned."""
-        return self.views is not None or self.views_share is not None
+        return self.views is not None or self.views_share is not None or self.together is not None
 
     def constraints(self) -> planner.Constraints:
         """Where sensor and light may stand."""
@@ -188,12 +195,14 @@ class Planned:
 def plan_command(given: Options) -> None:
     """Find where sensor and light should stand, and render the best settings to see whether they are."""
     import planner
-    from validation.cli import plan_board, plan_capability, plan_views
+    from validation.cli import plan_board, plan_bundle, plan_capability, plan_views
 
     _check_options(given)
     poses = {name: parse_poses(f"--{name}", getattr(given, name)) for name in ("sensor", "light")}
     first = parse_poses("--start", given.start)
-    if given.several:
+    if given.together is not None:
+        plan_bundle.check_options(given.context, given.views, given.together)
+    elif given.several:
         plan_views.check_options(given.context, given.views, given.views_share)
     target = _target(given) if given.write else None
     scene = scenes.load(given.scene)
@@ -212,6 +221,8 @@ def plan_command(given: Options) -> None:
     if given.place_board:
         plan_board.run(scene, given, how, target)
         return
+    if given.together is not None:
+        plan_bundle.run(scene, given, how)
     if given.several:
         plan_views.run(scene, given, how, checked=bool(count))
         _say_unchecked(scene, given, count)
@@ -268,7 +279,7 @@ def _check_options(given: Options) -> None:
     check_number("--light-body", given.light_body, 0, 1e12)
     if given.same_mount and given.separation > 0:
         raise scenes.InvalidInput(f"--separation must be left out with --same-mount, got {given.separation:g}")
-    for option in ("views", "views_share", "coverage", "sensor", "light", "vary") if given.certify else ():
+    for option in ("views", "views_share", "together", "coverage", "sensor", "light", "vary") if given.certify else ():
         if getattr(given, option):
             name = option.replace("_", "-")
             raise scenes.InvalidInput(f"--certify must be left out with --{name}, got both")
