@@ -229,8 +229,8 @@ def predict(
         Whether edges' surroundings and rims of circles are looked at closely (up to seconds on parts of many edges), or
         glanced at as by the search of `plan`: biases are then NaN, and ``glanced`` is said for ``ok``.
     roughly : bool
-        Whether a close look takes the light between faces from few rays, as ``ice new`` does: several times faster,
-        and now and then another status.
+        Whether a close look takes the light between faces from few rays, as ``ice new`` does to choose a setting:
+        several times faster, and now and then another status.
 
     Raises
     ------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -35,9 +35,10 @@ class FirstLook:
     Attributes
     ----------
     measurands : tuple of Measurand
-        Of different sorts; at most six where nothing else is asked for.
+        Of different sorts; at most six where nothing else is asked for. Those that are not ``ok``, with light between
+        faces told roughly, are there only where none is.
     statuses : tuple of str
-        What is predicted of each; those that are not ``ok`` are there only where none is.
+        What is predicted of each.
     sensor, light : Pose
     reasons : tuple of str
         What decided each status, with its number; empty for ``ok``.
@@ -48,6 +49,17 @@ class FirstLook:
     sensor: Pose
     light: Pose
     reasons: tuple[str, ...] = ()
+
+    def closely(self, scene: Scene) -> FirstLook:
+        """With the statuses that `planner.predict` says where light between faces is not told roughly.
+
+        Parameters
+        ----------
+        scene : Scene
+            As for `first_look`.
+        """
+        told = _told(scene, self.measurands, self.sensor, self.light, roughly=False)
+        return replace(self, **_said(told, self.measurands))
 
     @property
     def facts(self) -> list[dict[str, str]]:
@@ -81,16 +93,31 @@ def first_look(
         seen = [m for m in np.argsort(-worth[number], kind="stable") if worth[number, m] > 0]
         some = _varied([candidates[m] for m in seen], max(_ASKED, most)) or candidates[:most]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
-        forecasts = planner.predict(scene.with_(measurands=some), sensor, light, roughly=True).measurands
-        told = {m: min((forecasts[k] for k in rows), key=_rank) for m, rows in zip(some, _rows(some), strict=True)}
+        told = _told(scene, some, sensor, light, roughly=True)
         good = [m for m in some if is_trusted(told[m].status)]
         if best is None or len(good) > best[0]:
             shown = tuple(_varied(good or some, most))
-            statuses, reasons = (tuple(getattr(told[m], each) for m in shown) for each in ("status", "reason"))
-            best = len(good), FirstLook(shown, statuses, sensor, light, reasons)
+            best = len(good), FirstLook(measurands=shown, sensor=sensor, light=light, **_said(told, shown))
         if len(good) >= max(_ENOUGH, most // 2):
             break
     return best[1]
+
+
+def _told(
+    scene: Scene, measurands: Sequence[Measurand], sensor: Pose, light: Pose, *, roughly: bool
+) -> dict[Measurand, Forecast]:
+    """The worst forecast of each."""
+    forecasts = planner.predict(scene.with_(measurands=measurands), sensor, light, roughly=roughly).measurands
+    rows = zip(measurands, _rows(measurands), strict=True)
+    return {each: min((forecasts[k] for k in some), key=_rank) for each, some in rows}
+
+
+def _said(told: dict[Measurand, Forecast], shown: Sequence[Measurand]) -> dict[str, tuple[str, ...]]:
+    """Statuses and reasons, as `FirstLook` has them."""
+    return {
+        "statuses": tuple(told[each].status for each in shown),
+        "reasons": tuple(told[each].reason for each in shown),
+    }
 
 
 def _from_everywhere(scene: Scene, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -95,15 +95,23 @@ def test_nothing_to_measure_is_a_scene_all_the_same(tmp_path):
     assert (look is None) == (again.measurands == ()) == (scene.measurands == ())
 
 
-def test_what_is_written_is_what_was_predicted(tmp_path):
+RISER = [(0, 0), (20, 0), (20, 6), (18, 6), (18, 14), (0, 14)]  # its light on the step of 2 mm below is much of it
+
+
+@pytest.mark.parametrize(
+    ("part", "statuses"), [(bracket(24), {"ok"}), (prism(RISER, 12), {"ok", "clutter"})], ids=["bracket", "riser"]
+)
+def test_what_is_written_is_what_was_predicted(tmp_path, part, statuses):
     """The scene of the file has the measurands, poses and statuses that were told; every value is the part's own."""
-    bracket(24).export(tmp_path / "part.stl")
+    part.export(tmp_path / "part.stl")
     look = written(tmp_path / "part.stl", tmp_path / "part.toml", "mm").look
     scene = scenes.load(tmp_path / "part.toml")
     assert scene.measurands == look.measurands
     assert (scene.settings[0].sensor, scene.settings[0].light) == (look.sensor, look.light)
     predicted = first_look.planner.predict(scene, look.sensor, look.light)
     assert tuple(each.status for each in predicted.measurands) == look.statuses
+    assert tuple(each.reason for each in predicted.measurands) == look.reasons
+    assert set(look.statuses) == statuses
     for each, measurand in zip(predicted.measurands, scene.measurands, strict=True):
         assert each.value_object == pytest.approx(true_value(scene.all_walls, measurand), rel=1e-9)
 
