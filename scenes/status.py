@@ -42,7 +42,7 @@ MEANINGS = {
     MISFIT: "the image is not what the model says within its noise: neither value nor variance can be relied on",
     CLUTTER: "what lies around an edge (another edge, shading, the end of the scale) biases the value",
     TONE_UNKNOWN: "neither file nor picture says whether levels are linear in the light, and it matters",
-    GLANCED: "known at a glance: what lies around its edges, and their bias, have not been looked at yet",
+    GLANCED: "known at a glance: what lies around its edges, and their bias, have not been looked at closely yet",
     OK: "value and sigma can be relied on",
 }
 REMEDIES = {
@@ -61,7 +61,7 @@ REMEDIES = {
     MISFIT: "mend the scene until it describes this picture (`ice fit`), or remove what is not in it",
     CLUTTER: "move lamp or camera (`ice plan`), or say more exactly how the part reflects: the bias is then taken off",
     TONE_UNKNOWN: "save linear levels, or say in the scene how levels follow the light",
-    GLANCED: "let camera and lamp rest: the close look follows",
+    GLANCED: "look closely, by `ice predict` or `ice plan`; while something is dragged, let camera and lamp rest",
     OK: "",
 }
 WORST_FIRST = tuple(MEANINGS)

@@ -11,11 +11,12 @@ from itertools import pairwise
 import numpy as np
 
 import planner
+from imaging.light.between import is_exchanged
 from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.pictures import Pictures
 from planner.forecast import Forecast
 from scenes import Measurand, Pose, Scene
-from scenes.status import WORST_FIRST, is_trusted
+from scenes.status import GLANCED, OK, WORST_FIRST, is_trusted
 
 _MOST, _ENOUGH = 6, 3  # measurands that are proposed; after so many no further setting is looked at
 _CLOSELY = 3, 24  # settings, of which the best is taken: of a large part, of a small one
@@ -35,10 +36,10 @@ class FirstLook:
     Attributes
     ----------
     measurands : tuple of Measurand
-        Of different sorts; at most six where nothing else is asked for. Those that are not ``ok``, with light between
-        faces told roughly, are there only where none is.
+        Of different sorts; at most six where nothing else is asked for.
     statuses : tuple of str
-        What is predicted of each.
+        What is predicted of each; those that are neither ``ok`` nor ``glanced`` are there only where none is. It is
+        ``glanced`` in place of ``ok`` where faces send light to each other, which a first look takes roughly.
     sensor, light : Pose
     reasons : tuple of str
         What decided each status, with its number; empty for ``ok``.
@@ -49,17 +50,6 @@ class FirstLook:
     sensor: Pose
     light: Pose
     reasons: tuple[str, ...] = ()
-
-    def closely(self, scene: Scene) -> FirstLook:
-        """With the statuses that `planner.predict` says where light between faces is not told roughly.
-
-        Parameters
-        ----------
-        scene : Scene
-            As for `first_look`.
-        """
-        told = _told(scene, self.measurands, self.sensor, self.light, roughly=False)
-        return replace(self, **_said(told, self.measurands))
 
     @property
     def facts(self) -> list[dict[str, str]]:
@@ -93,31 +83,21 @@ def first_look(
         seen = [m for m in np.argsort(-worth[number], kind="stable") if worth[number, m] > 0]
         some = _varied([candidates[m] for m in seen], max(_ASKED, most)) or candidates[:most]
         sensor, light = Pose.of(sensors[number]), Pose.of(lights[number])
-        told = _told(scene, some, sensor, light, roughly=True)
+        forecasts = planner.predict(scene.with_(measurands=some), sensor, light, roughly=True).measurands
+        told = {m: min((forecasts[k] for k in rows), key=_rank) for m, rows in zip(some, _rows(some), strict=True)}
         good = [m for m in some if is_trusted(told[m].status)]
         if best is None or len(good) > best[0]:
             shown = tuple(_varied(good or some, most))
-            best = len(good), FirstLook(measurands=shown, sensor=sensor, light=light, **_said(told, shown))
+            statuses, reasons = (tuple(getattr(told[m], each) for m in shown) for each in ("status", "reason"))
+            best = len(good), FirstLook(shown, statuses, sensor, light, reasons)
         if len(good) >= max(_ENOUGH, most // 2):
             break
-    return best[1]
+    return _glanced(best[1]) if is_exchanged(scene) else best[1]
 
 
-def _told(
-    scene: Scene, measurands: Sequence[Measurand], sensor: Pose, light: Pose, *, roughly: bool
-) -> dict[Measurand, Forecast]:
-    """The worst forecast of each."""
-    forecasts = planner.predict(scene.with_(measurands=measurands), sensor, light, roughly=roughly).measurands
-    rows = zip(measurands, _rows(measurands), strict=True)
-    return {each: min((forecasts[k] for k in some), key=_rank) for each, some in rows}
-
-
-def _said(told: dict[Measurand, Forecast], shown: Sequence[Measurand]) -> dict[str, tuple[str, ...]]:
-    """Statuses and reasons, as `FirstLook` has them."""
-    return {
-        "statuses": tuple(told[each].status for each in shown),
-        "reasons": tuple(told[each].reason for each in shown),
-    }
+def _glanced(look: FirstLook) -> FirstLook:
+    """A look that took light between faces roughly: a close one may find that it moves what is ``ok``."""
+    return replace(look, statuses=tuple(GLANCED if each == OK else each for each in look.statuses))
 
 
 def _from_everywhere(scene: Scene, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -153,8 +153,6 @@ def written(
         look = first_look(scene, candidates, report, **({"most": len(options)} if options else {}))
         look = _each_once(look, asked) if options else look
         look = replace(look, measurands=with_material(scene.solid, look.measurands, asked))
-        report("looking at what is proposed", 4, 5)
-        look = look.closely(scene)
     text += _NOTHING if look is None else _measured(look, asked)
     made = _loaded(text, path, record)
     path.write_text(text, encoding="utf-8")
