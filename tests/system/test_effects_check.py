@@ -26,7 +26,8 @@ def test_left_out_effects_are_within_their_bounds(name, only):
     cheap = check(scene, quality=COARSE, settings=scene.settings[:1], only=only)
     assert [row.name for row in cheap] == list(only)
     assert all(row.holds for row in cheap), cheap
-    assert all(row.bias_px != 0 for row in cheap), cheap  # the pictures are not the same ones
+    if SLOW:  # a compiled variant's rays are the same, with or without a floor that is not seen
+        assert all(row.bias_px != 0 for row in cheap), cheap  # the pictures are not the same ones
 
 
 def test_light_of_some_size_is_within_its_bound(task1):

