@@ -236,9 +236,13 @@ def _with_pooled(values: np.ndarray, pooled: np.ndarray) -> np.ndarray:
 
 
 def _sigmas(covariance: np.ndarray) -> np.ndarray:
-    """Standard deviations (M,) of a covariance; 0 where there is no value."""
+    """Standard deviations (M,) of a covariance; 1 where there is no value, whatever they are multiplied by.
+
+    >>> np.inf * _sigmas(np.diag([4.0, np.inf]))
+    array([inf, inf])
+    """
     variance = np.diag(covariance)
-    return np.sqrt(np.where(np.isfinite(variance), variance, 0.0))
+    return np.sqrt(np.where(np.isfinite(variance), variance, 1.0))
 
 
 def _where_known(deviations: np.ndarray, covariance: np.ndarray) -> np.ndarray:

@@ -5,18 +5,16 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
-import os
 import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
-from unittest import mock
 
-from render import variant
 from scenes.model import rebuild
 from tests.regression.digest import Digest, Digester, together
+from tests.regression.stored import uncompiled
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = "scenes", "imaging", "planner", "measure", "render", "validation"
@@ -131,7 +129,6 @@ def recorded(make: Callable[[], Any]) -> dict[str, list[Call]]:
     _modules()
     forget()
     recorder = Recorder()
-    with mock.patch.dict(os.environ, {variant.OVERRIDE: variant.SCALAR}), recorder.recording():
+    with uncompiled(), recorder.recording():
         make()
-    variant.choose.cache_clear()
     return recorder.calls

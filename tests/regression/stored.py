@@ -6,13 +6,18 @@ import dataclasses
 import functools
 import json
 import math
+import os
 import re
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pydantic
+
+from render import variant
 
 CLOSED, SEARCHED, RENDERED = 1e-6, 2e-3, 5e-2  # relative; measured: 1e-12, 1e-6, 9e-3 where Embree has no AVX
 TRACED = 5e-5  # of light that goes between a part and its floor; measured: 4e-6 where BLAS or Embree has other kernels
@@ -34,6 +39,17 @@ def write(stored: Path, documents: dict[str, Any]) -> None:
     """Store documents by name, a line each."""
     lines = [f"{json.dumps(name)}: {json.dumps(made)}" for name, made in documents.items()]
     stored.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+
+
+@contextmanager
+def uncompiled() -> Iterator[None]:
+    """Pictures are rendered as everywhere: rays of a compiled variant are others."""
+    try:
+        with mock.patch.dict(os.environ, {variant.OVERRIDE: variant.SCALAR}):
+            variant.choose.cache_clear()
+            yield
+    finally:
+        variant.choose.cache_clear()
 
 
 def told(value: Any, deep: int = 0) -> Any:
