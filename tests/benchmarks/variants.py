@@ -24,6 +24,7 @@ from scenes import Picture
 
 SCENES = "task1", "bracket_mm", "shaft", "flange", "glossy_metal"
 _AGAIN = 3
+_NVIDIA = Path("/dev/nvidiactl")  # what its driver makes
 
 
 def drawn(name: str) -> tuple[np.ndarray, Picture, list[float]]:
@@ -59,9 +60,8 @@ def _other(name: str, variant: str, path: Path) -> tuple[np.ndarray, list[float]
 
 def available() -> list[str]:
     """Variants that work here, the scalar one first."""
-    chosen = variants.choose()
-    llvm = chosen == variants.LLVM or any(map(variants._works, variants._candidates()))
-    return [variants.SCALAR, *[variants.LLVM] * llvm, *[variants.CUDA] * (chosen == variants.CUDA)]
+    llvm = variants.choose() == variants.LLVM or any(map(variants._works, variants._candidates()))
+    return [variants.SCALAR, *[variants.LLVM] * llvm, *[variants.CUDA] * _NVIDIA.exists()]
 
 
 def main(names: list[str]) -> None:

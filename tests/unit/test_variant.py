@@ -4,7 +4,6 @@ import builtins
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +14,6 @@ from scenes import InvalidInput
 @pytest.fixture(autouse=True)
 def _fresh(monkeypatch):
     monkeypatch.delenv(variant.OVERRIDE, raising=False)
-    monkeypatch.setattr(variant, "_NVIDIA", Path("/none"))
     variant.choose.cache_clear()
     yield
     variant.choose.cache_clear()
@@ -47,19 +45,6 @@ def test_library_that_aborts_the_process_means_scalar(monkeypatch, tmp_path):
     assert variant.choose() == variant.SCALAR
 
 
-@pytest.mark.parametrize(("probe", "found"), [("pass", variant.CUDA), ("import os; os.abort()", variant.SCALAR)])
-def test_cuda_is_taken_where_there_is_a_driver_and_the_trial_succeeds(monkeypatch, tmp_path, probe, found):
-    monkeypatch.setattr(variant, "_NVIDIA", tmp_path)
-    monkeypatch.setattr(variant, "_CUDA_PROBE", probe)
-    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/none")
-    assert variant.choose() == found
-
-
-def test_the_trial_of_cuda_is_a_program_that_renders():
-    """It was not: it named no integrator, so every trial failed and CUDA was never taken."""
-    assert variant._runs(variant._CUDA_PROBE.replace(variant.CUDA, variant.SCALAR), dict(os.environ))
-
-
 def test_newest_library_that_works_is_taken(monkeypatch):
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
     monkeypatch.setattr(variant, "_candidates", lambda: ["/llvm/20", "/llvm/19", "/llvm/18"])
@@ -71,6 +56,16 @@ def test_newest_library_that_works_is_taken(monkeypatch):
 def test_releases_are_compared_as_numbers():
     paths = ["/usr/lib/libLLVM-9.so.1", "/usr/lib/libLLVM.so.19.1", "/usr/lib/libLLVM-14.so"]
     assert max(paths, key=variant._release) == "/usr/lib/libLLVM.so.19.1"
+
+
+def test_cuda_is_taken_only_by_its_name(monkeypatch):
+    """Whatever works here: a limb was wrong with it."""
+    monkeypatch.setattr(variant, "_runs", lambda *program: True)
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "libLLVM.so")
+    assert variant.choose() == variant.LLVM
+    variant.choose.cache_clear()
+    monkeypatch.setenv(variant.OVERRIDE, variant.CUDA)
+    assert variant.choose() == variant.CUDA
 
 
 def test_override(monkeypatch):
