@@ -40,8 +40,8 @@ assert list(drjit.minimum(Float(1, 2, 3), 2)) == [1, 2, 2]
 def choose() -> str:
     """Name of the variant to render with; found once a process.
 
-    The environment variable ICE_VARIANT overrides the choice. CUDA is taken only where that names it: a limb beside an arc
-    was 278 sigma off with it, for a reason that is not known.
+    The environment variable ICE_VARIANT overrides the choice. CUDA is taken only where that names it: a limb beside an
+    arc was 278 sigma off with it, for a reason that is not known.
     DRJIT_LIBLLVM_PATH, where set, is the only libLLVM that is tried; otherwise the newest installed one that passes.
     """
     if OVERRIDE in os.environ:
