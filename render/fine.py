@@ -34,6 +34,7 @@ from render.surroundings import near_edges
 from render.texture import Face
 from scenes import Picture
 
+_STEEP = 3  # pixels about an edge in which light that one of its faces sends to the other is not even over a pixel
 _NEAR = 16  # rays of a fine pixel beside an edge, where what is random is faint
 
 
@@ -291,7 +292,8 @@ class _Tracer:
         def uneven() -> np.ndarray:
             if self.picture.scene.textures:
                 return np.ones([size // k for size in shape], bool)
-            return some_of(dilated(edges_of(self.picture, every, shape, self.start, k, creases=True), 3), k)
+            edges = dilated(edges_of(self.picture, every, shape, self.start, k, creases=True), 3)
+            return dilated(some_of(edges, k), 2 * _STEEP + 1)
 
         return Even(lambda marked: lent_to(self.picture, marked, first, 1), uneven)
 
