@@ -18,6 +18,7 @@ from measure.covariances import of_measured, scaled
 from measure.goodness import WORST
 from measure.known_bias import Correction
 from measure.measurement import check_same, checked_image
+from measure.placement import locate
 from measure.quantities import MeasuredFeatures, find
 from measure.saturation import saturated
 from scenes import InvalidInput, Picture, Quantity, status
@@ -159,7 +160,8 @@ def bundle(
     Notes
     -----
     The part's place counts as known to ``uncertainty.part_shift`` and ``part_tilt_deg``, datums on it to
-    ``placement.datum_sd``. Part and sensors are expected anew, and looked for again, until that moves nothing by more
+    ``placement.datum_sd``. Where placement is from datums or a board the part is found in each picture first
+    (`measure.locate`). Part and sensors are expected anew, and looked for again, until that moves nothing by more
     than 0.02 px; of stacks where the mean of all images puts them. Biases are those of the pictures that are given:
     beside them, as far as sensors and part are moved, they count as the same.
 
@@ -174,7 +176,7 @@ def bundle(
     """
     freedom = Freedom(sensors, shape, axes, cameras)
     stacks, pictures, lead = _checked(shots)
-    expected = Bundle.of(pictures, freedom)
+    expected = _begun(stacks, Bundle.of(pictures, freedom))
     known = [
         _Known.of_picture(*one, estimator) for one in zip(stacks, pictures, _each(corrections, pictures), strict=True)
     ]
@@ -188,6 +190,19 @@ def bundle(
             break
         expected = expected.moved_by(numbers)
     return _gathered(expected, every, lead)
+
+
+def _begun(stacks: Sequence[np.ndarray], bundle: Bundle) -> Bundle:
+    """The same where images (n, height, width) show part and camera, as each alone has them; as the scene says of what
+    is not found, or where the part's place is not left to the pictures."""
+    if not bundle.pictures[0].scene.placement.is_estimated:
+        return bundle
+    each = [locate(stack.mean(0), picture) for stack, picture in zip(stacks, bundle.pictures, strict=True)]
+    there = {k: one.placement for k, one in enumerate(each, 1) if one.status == status.OK}
+    told = bundle.freedom.of_sensors(len(each))
+    held = [place for k, place in there.items() if told[k - 1] != "unknown"] or list(there.values())[:1]
+    free = {k: place for k, place in there.items() if told[k - 1] == "unknown"}
+    return bundle.placed_at(np.mean(held, 0), free) if held else bundle
 
 
 def _each(corrections: Sequence[Correction] | None, pictures: list[Picture]) -> Sequence[Correction | None]:
@@ -232,7 +247,7 @@ class _Known:
     def taken(self, found: MeasuredFeatures, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, FeatureBias | None]:
         """Of the i-th image how far off lines and circles are (q,), their covariance by noise (q, q), statuses
         (E + C,) and biases."""
-        off, errors, states = found.offsets[i], found.of_datums[i], found.states(i)
+        off, errors, states = found.offsets[i], _without_misfits(found, i), found.states(i)
         if not self.is_corrected:
             return off, errors, states, None
         if self.bias is None or not self.of[i]:
@@ -242,6 +257,16 @@ class _Known:
         states = self.bias.states_of(states, ~seen.features_of(~known))
         errors = scaled(errors, np.where(np.eye(len(known), dtype=bool), self.bias.errors, 0.0), doubtful & known)
         return off - np.where(known, self.bias.bias, 0.0), errors, states, self.bias
+
+
+def _without_misfits(found: MeasuredFeatures, i: int) -> np.ndarray:
+    """Covariance (q, q) of lines and circles of the i-th image; infinite of a board whose points do not fit it."""
+    errors = found.of_datums[i]
+    if found.board is None or found.board.state[i] != status.MISFIT:
+        return errors
+    lost, board = errors.copy(), found.known.seen.of_board
+    lost[board, board] = np.diag(np.full(found.known.seen.board, np.inf))
+    return lost
 
 
 @dataclass(frozen=True, eq=False)

@@ -180,8 +180,7 @@ def find(
         quantity: find_form(images, picture, quantity, shape, by_name, noiseless=noiseless)
         for quantity in known.seen.forms
     }
-    told = known.placing and known.placing.board
-    board = find_board(images, picture, told) if told else None
+    board = find_board(images, picture, known.board) if known.board else None
     sizes = {quantity: form.size for quantity, form in forms.items()}
     seen = found_in_images(known, layout, shape.normals, shape.points, tuple(c.errors for c in circles), sizes)
     found = MeasuredFeatures(

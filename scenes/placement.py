@@ -119,6 +119,11 @@ def of_board(uncertainty: Uncertainty) -> np.ndarray:
     return np.array([0.0 if told is None else told.u for told in uncertainty.of_board])
 
 
+def pitch_u(scene: Scene) -> float:
+    """Standard uncertainty of the pitch of the board, the scene's unit; 0: it is exact."""
+    return next((each.u for each in scene.uncertain if each.key == PITCH), 0.0)
+
+
 def limits(uncertainty: Uncertainty) -> np.ndarray:
     """How far a placement's components may plausibly be off, (6,): half widths, or three standard uncertainties."""
     told = uncertainty.of_part

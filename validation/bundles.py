@@ -56,12 +56,14 @@ def inspect(
 
     Notes
     -----
-    Simulated are the pictures as they are said to be; those of sensors of which nothing is known, as they are found.
+    Simulated are the pictures as they are said to be; those of sensors of which nothing is known, or of
+    a part whose place is left to the pictures, as they are found.
     """
     found = measure.bundle(shots, sensors, estimator=estimator)
     is_lit = all(picture.lights for _, picture in shots)
     if correct and is_lit and np.isfinite(found.value).any():
-        there = found.pictures if sensors == "unknown" else [picture for _, picture in shots]
+        is_moved = sensors == "unknown" or shots[0][1].scene.placement.is_estimated
+        there = found.pictures if is_moved else [picture for _, picture in shots]
         corrections = [kept.correction(one, Method(estimator or measure.best_estimator(one))) for one in there]
         found = measure.bundle(shots, sensors, corrections=corrections)
     return _decided(found, sensors)

@@ -28,9 +28,8 @@ from imaging.geometry.projection import depth, from_axis
 from imaging.geometry.rays import first_face
 from imaging.light.appearance import signal
 from imaging.pictures import Pictures
-from scenes import Board, Material, Scene
-from scenes.board import PITCH
-from scenes.placement import of_board, root
+from scenes import Board, Material
+from scenes.placement import of_board, pitch_u, root
 
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
 CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
@@ -45,6 +44,7 @@ class SeenBoard:
 
     Attributes
     ----------
+    board : Board
     slopes : ndarray, shape (..., n, 2, k)
         J: ideal px.
     noise : ndarray, shape (..., n, 2, 2)
@@ -55,6 +55,7 @@ class SeenBoard:
         L in standard uncertainties: place relative to the part, pitch.
     """
 
+    board: Board
     slopes: np.ndarray
     noise: np.ndarray
     printed: np.ndarray
@@ -108,19 +109,15 @@ def seen_board(pictures: Pictures, seen: Seen) -> SeenBoard | None:
     by_place = seen.slopes(board.points)  # (..., n, 2, 3)
     moved = points_by_deviations(board.points, pictures.sensors, pictures.scene)
     away = board.points - np.array(board.corner)
-    by_pitch = np.einsum("...nij,nj->...ni", by_place, away / board.pitch)[..., None] * _pitch_u(pictures.scene)
+    by_pitch = np.einsum("...nij,nj->...ni", by_place, away / board.pitch)[..., None] * pitch_u(pictures.scene)
     beside = np.concatenate([moved[..., :6] * of_board(said), by_pitch], -1)
     return SeenBoard(
+        board=board,
         slopes=moved @ root(pictures.scene),
         noise=_noise(pictures, board),
         printed=board.point_sd**2 * by_place @ np.swapaxes(by_place, -1, -2),
         beside=beside,
     )
-
-
-def _pitch_u(scene: Scene) -> float:
-    """Standard uncertainty of the board's pitch, the scene's unit."""
-    return next((each.u for each in scene.uncertain if each.key == PITCH), 0.0)
 
 
 def _noise(pictures: Pictures, board: Board) -> np.ndarray:

@@ -9,23 +9,24 @@ stays open.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
+from imaging.boards.seen import SeenBoard
+from imaging.bundles import rows
 from imaging.bundles.in_space import InSpace
 from imaging.bundles.told import Told
-from imaging.bundles.unknowns import Freedom, Unknowns, rim, rim_moves
-from imaging.features.displaced import around, by_camera, by_place, of_circle, rim_fit, rim_normals, steps
+from imaging.bundles.unknowns import Freedom, Unknowns, in_rad
+from imaging.features.displaced import steps
 from imaging.features.measurand import measurands
 from imaging.features.placing import whitening
 from imaging.features.seen import Seen
-from imaging.geometry.projection import from_axis
 from imaging.pictures import Pictures
-from imaging.placed import difference, placed, turn
+from imaging.placed import difference, placed
 from scenes import InvalidInput, Picture, Quantity, Wall
 from scenes.measurands.form import forms_of
 from scenes.measurands.kinds import MEASURANDS
@@ -46,6 +47,8 @@ class Bundle:
     unknowns : Unknowns
     seen : tuple of Seen
         What each is expected to show.
+    boards : tuple of SeenBoard or None
+        The same of a board beside the part.
     moved : ndarray, shape (n,)
         What of the unknowns the expected pictures have already, beside what the scene says.
     """
@@ -54,6 +57,7 @@ class Bundle:
     freedom: Freedom
     unknowns: Unknowns
     seen: tuple[Seen, ...]
+    boards: tuple[SeenBoard | None, ...]
     moved: np.ndarray
 
     @classmethod
@@ -68,20 +72,34 @@ class Bundle:
         pictures = tuple(pictures)
         _check(pictures)
         each = tuple(Pictures.of(picture) for picture in pictures)
-        seen = tuple(measurands(one).seen for one in each)
+        known = [measurands(one) for one in each]
+        seen, boards = tuple(one.seen for one in known), tuple(one.board for one in known)
         unknowns = Unknowns.of(pictures[0].scene, each, seen[0], freedom)
-        return cls(pictures, freedom, unknowns, seen, np.zeros(unknowns.count) if moved is None else moved)
+        return cls(pictures, freedom, unknowns, seen, boards, np.zeros(unknowns.count) if moved is None else moved)
 
     def moved_by(self, numbers: np.ndarray) -> Bundle:
-        """The same with part and sensors expected elsewhere, by the unknowns (n,); lights go with the sensors."""
+        """The same with part, sensors and what is estimated of the camera expected elsewhere, by the unknowns (n,);
+        lights go with the sensors."""
         moved, pictures = np.zeros(self.unknowns.count), []
         for k, picture in enumerate(self.pictures, 1):
             part, sensor = map(_in_degrees, (self.unknowns.full("part", numbers), self.unknowns.sensor(k) @ numbers))
-            pictures.append(placed(placed(picture, part), difference(np.zeros(6), sensor)))
-        sensors = (f"sensor {k}" for k in range(1, len(pictures) + 1))
-        for name in ("part", *sensors, *self.unknowns.carried):
+            camera = self.unknowns.full(self.unknowns.estimated(k), numbers)
+            pictures.append(placed(placed(picture, np.append(part, camera)), difference(np.zeros(6), sensor)))
+        many = range(1, len(pictures) + 1)
+        own = (*(f"sensor {k}" for k in many), *dict.fromkeys(map(self.unknowns.estimated, many)))
+        for name in ("part", *own, *self.unknowns.carried):
             moved[self.unknowns.slices[name]] = numbers[self.unknowns.slices[name]]
         return Bundle.of(pictures, self.freedom, self.moved + moved)
+
+    def placed_at(self, placement: np.ndarray, by_sensor: Mapping[int, np.ndarray]) -> Bundle:
+        """The same with the part, and what is estimated of the camera, at a placement (6 + c,) in all pictures, and the
+        sensors of some numbers where its place in their pictures alone is another one."""
+        cameras = {self.unknowns.estimated(k): placement[6:] for k in range(1, len(self.pictures) + 1)}
+        full = {"part": in_rad(placement[:6])} | cameras
+        for k, there in by_sensor.items():
+            sensor = difference(np.zeros(6), difference(there[:6], placement[:6]))
+            full[f"sensor {k}"] = in_rad(sensor)
+        return self.moved_by(self.unknowns.numbers(full))
 
     def reach(self, numbers: np.ndarray) -> float:
         """How far unknowns (n,) of the part and the sensors move what is seen of it at most, px."""
@@ -99,8 +117,9 @@ class Bundle:
 
     @cached_property
     def designs(self) -> tuple[np.ndarray, ...]:
-        """Derivatives (q, n) of each picture's lines and circles by the unknowns."""
-        return tuple(_design(self.unknowns, seen, k) for k, seen in enumerate(self.seen, 1))
+        """Derivatives (q, n) of each picture's lines and circles, and board, by the unknowns."""
+        both = enumerate(zip(self.seen, self.boards, strict=True), 1)
+        return tuple(rows.design(self.unknowns, seen, board, k) for k, (seen, board) in both)
 
     def adjusted(
         self,
@@ -123,8 +142,10 @@ class Bundle:
         return BundleAdjustment(self, tuple(whites), tuple(told))
 
     def expected(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """How far lines and circles (q,) of each picture are off by unknowns (n,) beside those of the pictures."""
-        return tuple(_off(self.unknowns, seen, k, numbers) for k, seen in enumerate(self.seen, 1))
+        """How far lines and circles, and a board, (q,) of each picture are off by unknowns (n,) beside those of the
+        pictures."""
+        both = enumerate(zip(self.seen, self.boards, strict=True), 1)
+        return tuple(rows.off(self.unknowns, seen, board, k, numbers) for k, (seen, board) in both)
 
     def at(self, numbers: np.ndarray) -> InSpace:
         """The features with unknowns (n,) beside what the scene says."""
@@ -161,8 +182,8 @@ class BundleAdjustment:
     @cached_property
     def told(self) -> Told:
         """By all rows: those of the pictures, then what is known before."""
-        rows = [white @ _finite(design) for white, design in zip(self.whites, self.bundle.designs, strict=True)]
-        return Told(np.concatenate([*rows, self._priors[0]]), self.bundle.unknowns.units)
+        whitened = [white @ _finite(design) for white, design in zip(self.whites, self.bundle.designs, strict=True)]
+        return Told(np.concatenate([*whitened, self._priors[0]]), self.bundle.unknowns.units)
 
     @cached_property
     def is_told(self) -> np.ndarray:
@@ -205,8 +226,8 @@ class BundleAdjustment:
         before = np.inf
         for _ in range(_STEPS):
             expected = self.bundle.expected(numbers)
-            rows = [w @ _finite(one - h) for w, one, h in zip(self.whites, found, expected, strict=True)]
-            left = np.concatenate([*rows, -priors @ (numbers + self.bundle.moved)])
+            off = [w @ _finite(one - h) for w, one, h in zip(self.whites, found, expected, strict=True)]
+            left = np.concatenate([*off, -priors @ (numbers + self.bundle.moved)])
             step = self.told.inverse @ left
             size = float(np.abs(self.told.rows @ step).max(initial=0.0))
             if size < _SETTLED or size >= before:
@@ -239,58 +260,6 @@ def _in_degrees(numbers: np.ndarray) -> np.ndarray:
     return np.where(np.arange(6) < 3, numbers, np.degrees(numbers))
 
 
-def _design(unknowns: Unknowns, seen: Seen, number: int) -> np.ndarray:
-    """Derivatives (q, n) of lines and circles of the picture of a number by the unknowns."""
-    solid, lengths = seen.solid, np.linalg.norm(seen.along, axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        whole = by_place(seen, np.array(unknowns.scene.camera.look_at)) @ unknowns.basis("part")
-        whole = whole - by_place(seen) @ unknowns.sensor(number)
-        whole = whole + by_camera(seen) @ unknowns.basis(unknowns.camera(number))
-        for e, name in enumerate(seen.names):
-            ends = list(solid.edge(name).ends)
-            slopes = np.einsum("i,nij->nj", seen.normals[e], seen.slopes(solid.vertices[ends]))
-            first, last = (
-                slope @ unknowns.basis(unknowns.vertex(end)) for slope, end in zip(slopes, ends, strict=True)
-            )
-            whole[2 * e] += first
-            whole[2 * e + 1] += (last - first) / lengths[e]
-        for c, name in enumerate(seen.circles):
-            circle = solid.circle(name)
-            whole[seen.numbers(c)] += of_circle(seen, circle, rim_moves(circle)) @ unknowns.basis(name)
-    return whole
-
-
-def _off(unknowns: Unknowns, seen: Seen, number: int, numbers: np.ndarray) -> np.ndarray:
-    """How far lines and circles (q,) are off in the picture of a number, by exact projection."""
-    solid, off = seen.solid, np.zeros(seen.count)
-    ends = np.array([_ends(unknowns, name, numbers) for name in seen.names]).reshape(-1, 2, 3)
-    image = _projected(unknowns, seen, number, numbers, ends.reshape(-1, 3)).reshape(-1, 2, 2)
-    off[: 2 * len(ends)] = seen.line_errors(image[:, 0], image[:, 1] - image[:, 0])
-    for c, name in enumerate(seen.circles):
-        circle = solid.circle(name)
-        there = _projected(unknowns, seen, number, numbers, rim(circle, unknowns.full(name, numbers)))
-        here = from_axis(circle.at(around(circle)), seen.sensors, seen.camera)
-        normal = rim_normals(seen, circle)
-        off[seen.numbers(c)] = rim_fit(seen, circle)[1] @ np.einsum("ni,ni->n", normal, there - here)
-    camera = unknowns.full(unknowns.camera(number), numbers)
-    return off + by_camera(seen) @ camera if camera.any() else off
-
-
-def _ends(unknowns: Unknowns, name: str, numbers: np.ndarray) -> np.ndarray:
-    solid = unknowns.scene.solid
-    ends = solid.edge(name).ends
-    return np.array([solid.vertices[end] + unknowns.full(unknowns.vertex(end), numbers) for end in ends])
-
-
-def _projected(unknowns: Unknowns, seen: Seen, number: int, numbers: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Image points (n, 2) of places (n, 3) on the part that is moved, before the sensor that is."""
-    part, sensor = unknowns.full("part", numbers), unknowns.sensor(number) @ numbers
-    pivot, own = np.array(unknowns.scene.camera.look_at), np.array(seen.camera.look_at)
-    there = (points - pivot) @ turn(np.degrees(part[3:])).T + pivot + part[:3]
-    before = (there - own - sensor[:3]) @ turn(np.degrees(sensor[3:])) + own
-    return from_axis(before, seen.sensors, seen.camera)
-
-
 def _check(pictures: tuple[Picture, ...]) -> None:
     if not pictures:
         raise InvalidInput("pictures must be at least one, got none")
@@ -298,16 +267,11 @@ def _check(pictures: tuple[Picture, ...]) -> None:
     for each in pictures[1:]:
         if each.scene.quantities != first.quantities or each.scene.object != first.object:
             raise InvalidInput("pictures must be of one part with the same measurands, got others")
+        if each.scene.placement.board != first.placement.board:
+            raise InvalidInput("pictures must be of the same board beside the part, got others")
     for each in first.quantities:
         curved = any(isinstance(feature, Wall) for feature in each.basic)
         if curved or MEASURANDS[each.kind].extreme or forms_of((each,)):
             raise InvalidInput(
                 f"measurands must be of straight edges and circles for several pictures, got {each.name}"
             )
-    if first.placement.board is not None:
-        raise InvalidInput("placement.from must be known, uncertain or datums for several pictures, got 'board'")
-    if first.placement.camera:
-        raise InvalidInput(
-            "placement.camera must be left out of several pictures, where the covariance says what is unknown, got "
-            f"{list(first.placement.camera)}"
-        )

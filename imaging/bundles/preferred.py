@@ -49,7 +49,7 @@ class Preferred:
         found = []
         for some in ([status.OK], held):
             counts = [np.isin(each, some) for each in states]
-            parts = [seen.of_features(each) for seen, each in zip(bundle.seen, counts, strict=True)]
+            parts = [seen.counted(each) for seen, each in zip(bundle.seen, counts, strict=True)]
             found += [bundle.adjusted(errors, parts, doubts), _measured(bundle, np.any(counts, 0))]
         good, of_good, every, of_every = found
         return cls(good, every, good.is_told & of_good, every.is_told & of_every)

@@ -3,8 +3,10 @@
 Blocks, each of some full numbers of which directions are free: ``part`` a shift and a rotation vector (rad) about the
 point that the camera looks at; ``sensor 1``, ... the same of each sensor; a vertex its three coordinates, a circle
 those of its centre, two tilts of its axis about its plane's axes (rad) and its radius; ``camera`` the parameters of
-its calibration (`imaging.bundles.cameras`); ``carrier`` errors of what carries sensor or part (`scenes.carriers`). All
-are errors beside what the scene says, features' along the axes of the part.
+its calibration (`imaging.bundles.cameras`), ``estimated`` what else is estimated of it (`scenes.cameras.estimated`);
+``carrier`` errors of what carries sensor or part (`scenes.carriers`);
+``board`` a shift and a turn of a board relative to the part, ``board pitch`` its scale, ``board points`` what print and
+flatness leave open of each point. All are errors beside what the scene says, features' along the axes of the part.
 """
 
 from __future__ import annotations
@@ -17,15 +19,18 @@ from typing import Literal
 import numpy as np
 
 from imaging.bundles.cameras import root
-from imaging.features.displaced import around
+from imaging.features.displaced import around, by_estimated
 from imaging.features.seen import Seen
 from imaging.geometry.projection import camera_frame, sensor_position
 from imaging.pictures import Pictures
 from scenes import Circle, InvalidInput, Scene, Side
+from scenes.cameras import estimated
 from scenes.carriers import Place, moved
 from scenes.measurands.features import along_of, face_beside, plane_of
-from scenes.placement import prior
+from scenes.placement import of_board, pitch_u, prior
 
+BOARD, BOARD_PITCH, BOARD_POINTS = "board", "board pitch", "board points"
+"""Blocks of a board beside the part."""
 Sensors = Literal["known", "uncertain", "unknown"]
 Shape = Literal["in_space", "in_plane"]
 Axes = Literal["known", "unknown"]
@@ -123,7 +128,7 @@ class Unknowns:
         Of the part, at the ends of the edges that are used.
     circles : tuple of str
     blocks : tuple of Block
-        The part, the V sensors, what carries them, the cameras, the vertices, the circles.
+        The part, the V sensors, what carries them, the cameras, the vertices, the circles, a board.
     carried : dict of str to tuple of ndarray, shape (6, k)
         By block of a carrier's errors (`scenes.carriers`): how each picture's sensor moves by its k numbers.
     """
@@ -140,12 +145,12 @@ class Unknowns:
         solid = scene.solid
         vertices = tuple(dict.fromkeys(end for name in seen.names for end in solid.edge(name).ends))
         sensors = freedom.of_sensors(len(pictures))
-        blocks = [Block.of("part", np.eye(6), _in_rad(prior(scene.uncertainty)), _TURNS)]
+        blocks = [Block.of("part", np.eye(6), in_rad(prior(scene.uncertainty)), _TURNS)]
         blocks += [_sensor(k, told, each) for k, (told, each) in enumerate(zip(sensors, pictures, strict=True), 1)]
         carried = _carried(pictures) if "uncertain" in sensors else {}
         blocks += [_of_one(name, moves[0].shape[1]) for name, moves in carried.items()]
-        blocks += _cameras(pictures, freedom)
-        blocks += _of_features(scene, vertices, seen, freedom)
+        blocks += [*_cameras(pictures, freedom), *_estimated(pictures, freedom)]
+        blocks += [*_of_features(scene, vertices, seen, freedom), *_of_board(scene)]
         return cls(scene, vertices, seen.circles, tuple(blocks), carried)
 
     @cached_property
@@ -163,6 +168,13 @@ class Unknowns:
         """A block's full numbers (f,) of all free ones (n,)."""
         return self._block(name).basis @ numbers[self.slices[name]]
 
+    def numbers(self, full: Mapping[str, np.ndarray]) -> np.ndarray:
+        """All free numbers (n,) of full ones (f,) of some blocks, as near to these as they can be; of others 0."""
+        found = np.zeros(self.count)
+        for name, numbers in full.items():
+            found[self.slices[name]] = np.linalg.pinv(self._block(name).basis) @ numbers
+        return found
+
     def basis(self, name: str) -> np.ndarray:
         """Derivatives (f, n) of a block's full numbers by all free ones."""
         whole = np.zeros((len(self._block(name).basis), self.count))
@@ -179,9 +191,14 @@ class Unknowns:
         """Changes (n,) that move a part of its size about alike: a length, and turns by it over the size."""
         return np.concatenate([np.where(each.turns, 1 / self.scene.solid.extent, 1.0) for each in self.blocks])
 
-    def camera(self, number: int) -> str:
-        """Name of the block of the camera of the picture of a number."""
-        return "camera" if "camera" in self.slices else f"camera {number}"
+    def camera(self, number: int) -> np.ndarray:
+        """Derivatives (9, n) of errors of the calibration's parameters of the camera of the picture of a number."""
+        name = "camera" if "camera" in self.slices else f"camera {number}"
+        return self.basis(name) + by_estimated(self.scene) @ self.basis(self.estimated(number))
+
+    def estimated(self, number: int) -> str:
+        """Name of the block of what is estimated of that camera."""
+        return "estimated" if "estimated" in self.slices else f"estimated {number}"
 
     def vertex(self, index: int) -> str:
         """Name of a vertex' block."""
@@ -206,9 +223,9 @@ class Unknowns:
         return {block.name: block for block in self.blocks}
 
 
-def _in_rad(sd: np.ndarray) -> np.ndarray:
-    """Of shifts and turns in degrees."""
-    return np.where(np.arange(6) < 3, sd, np.radians(sd))
+def in_rad(numbers: np.ndarray) -> np.ndarray:
+    """A shift and a turn, (6,), of one in degrees."""
+    return np.where(np.arange(6) < 3, numbers, np.radians(numbers))
 
 
 def _sensor(number: int, told: Sensors, pictures: Pictures) -> Block:
@@ -224,7 +241,7 @@ def _sensor(number: int, told: Sensors, pictures: Pictures) -> Block:
     aside = said.sensor_deg.u if said.sensor_deg is not None else jitter
     turns = [aside, aside, 0.0 if said.sensor_roll_deg is None else said.sensor_roll_deg.u]
     reach = 0.0 if said.sensor_distance is None else said.sensor_distance.u
-    return Block.of(f"sensor {number}", directions, _in_rad(np.array([0.0, 0.0, reach, *turns])), _TURNS)
+    return Block.of(f"sensor {number}", directions, in_rad(np.array([0.0, 0.0, reach, *turns])), _TURNS)
 
 
 def _carried(pictures: tuple[Pictures, ...]) -> dict[str, tuple[np.ndarray, ...]]:
@@ -261,6 +278,15 @@ def _cameras(pictures: tuple[Pictures, ...], freedom: Freedom) -> Iterator[Block
             return
 
 
+def _estimated(pictures: tuple[Pictures, ...], freedom: Freedom) -> Iterator[Block]:
+    """What is estimated of all pictures' camera, or of each its own, beside what its calibration leaves open."""
+    for k, each in enumerate(pictures, 1):
+        sd = np.sqrt(estimated.uncalibrated(each.scene))
+        yield Block.of("estimated" if freedom.cameras == "one" else f"estimated {k}", np.eye(len(sd)), sd, slice(0))
+        if freedom.cameras == "one":
+            return
+
+
 def _of_features(scene: Scene, vertices: tuple[int, ...], seen: Seen, freedom: Freedom) -> Iterator[Block]:
     """Of datums what their manufacture leaves open; of others nothing is known, or that they lie in their planes."""
     solid, placement = scene.solid, scene.placement
@@ -276,6 +302,15 @@ def _of_features(scene: Scene, vertices: tuple[int, ...], seen: Seen, freedom: F
         sd[2] = 0.0 if freedom.shape == "in_plane" else sd[2]
         sd[3:5] = 0.0 if freedom.axes == "known" or freedom.shape == "in_plane" else np.inf
         yield Block.of(name, axes, sd, slice(3, 5))
+
+
+def _of_board(scene: Scene) -> Iterator[Block]:
+    """Of a board beside the part, where there is one: the same numbers in all pictures."""
+    board, still = scene.placement.board, slice(0)
+    if board is not None:
+        yield Block.of(BOARD, np.eye(6), in_rad(of_board(scene.uncertainty)), _TURNS)
+        yield Block.of(BOARD_PITCH, np.eye(1), np.array([pitch_u(scene)]), still)
+        yield Block.of(BOARD_POINTS, np.eye(3 * board.count), np.full(3 * board.count, board.point_sd), still)
 
 
 def _planes(scene: Scene, edges: tuple[str, ...]) -> dict[int, list[np.ndarray]]:

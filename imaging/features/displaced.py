@@ -123,7 +123,7 @@ def by_deviations(seen: Seen, scene: Scene) -> np.ndarray:
     """Derivatives (..., q, 6 + c) of lines and circles by a placement, the scene's unit and degrees, and by what is
     estimated of the camera."""
     moved = by_place(seen) * _UNITS
-    return np.concatenate([moved, by_camera(seen) @ _numbers(scene)], -1) if scene.placement.camera else moved
+    return np.concatenate([moved, by_camera(seen) @ by_estimated(scene)], -1) if scene.placement.camera else moved
 
 
 def points_by_deviations(points: np.ndarray, poses: np.ndarray, scene: Scene) -> np.ndarray:
@@ -132,10 +132,10 @@ def points_by_deviations(points: np.ndarray, poses: np.ndarray, scene: Scene) ->
     moved = jacobian_ideal(points, poses, camera) @ (steps(points, np.array(camera.look_at)) * _UNITS)
     if not scene.placement.camera:
         return moved
-    return np.concatenate([moved, shifts(from_axis(points, poses, camera), camera) @ _numbers(scene)], -1)
+    return np.concatenate([moved, shifts(from_axis(points, poses, camera), camera) @ by_estimated(scene)], -1)
 
 
-def _numbers(scene: Scene) -> np.ndarray:
+def by_estimated(scene: Scene) -> np.ndarray:
     """What is estimated of the camera as errors of a calibration's parameters (`ORDER`), (9, c)."""
     rows = {"focal": np.isin(ORDER, ("fx", "fy")) * scene.camera.focal_px, "k1": np.isin(ORDER, ("k1",)) * 1.0}
-    return np.stack([rows[name] for name in scene.placement.camera], -1)
+    return np.array([rows[name] for name in scene.placement.camera]).reshape(-1, len(ORDER)).T

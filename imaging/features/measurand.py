@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from imaging.boards.seen import seen_board
+from imaging.boards.seen import SeenBoard, seen_board
 from imaging.features.kinds import Evaluated, in_image, on_plane
 from imaging.features.placing import Placing
 from imaging.features.projected_edges import ProjectedEdges, circles, corner_features, projected_edges
@@ -60,6 +60,11 @@ class Measurands:
     def datums(self) -> tuple[str, ...]:
         """Names of what tells where the part lies: features of the part, or the board beside it."""
         return () if self.placing is None else self.placing.features
+
+    @property
+    def board(self) -> SeenBoard | None:
+        """What stands beside the part and tells where it lies."""
+        return None if self.placing is None else self.placing.board
 
     @property
     def value(self) -> np.ndarray:

@@ -107,6 +107,12 @@ class Seen:
             which[self.numbers(c)] = some[edges + c]
         return which
 
+    def counted(self, some: np.ndarray) -> np.ndarray:
+        """The same, and those of a board, which counts wherever it is found."""
+        which = self.of_features(some)
+        which[self.of_board] = True
+        return which
+
     def features_of(self, some: np.ndarray) -> np.ndarray:
         """Which edges and circles, bool (E + C,), have one of some parameters, bool (q,), at least."""
         edges = some[: 2 * len(self.names)].reshape(-1, 2).any(1)

@@ -251,7 +251,7 @@ def _one(
 
 def _with_board(joint: np.ndarray, known: Measurands) -> np.ndarray:
     """Covariance of lines with that of a board's parameters, whose points count as they are fitted."""
-    board = None if known.placing is None else known.placing.board
+    board = known.board
     return joint if board is None else block_diag(joint, board.spread(board.noise))
 
 

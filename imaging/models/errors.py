@@ -118,8 +118,7 @@ class Errors:
     @cached_property
     def _of_board(self) -> np.ndarray:
         """Covariance (..., k, k) of a board's parameters by noise."""
-        placing = self.measurands.placing
-        board = None if placing is None else placing.board
+        board = self.measurands.board
         return np.zeros((0, 0)) if board is None else board.spread(board.noise)
 
     def by_board(self, gradient: np.ndarray) -> np.ndarray:

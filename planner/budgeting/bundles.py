@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imaging.bundles.biases import FeatureBias
-from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
+from imaging.bundles.unknowns import BOARD, Axes, Cameras, Freedom, Sensors, Shape
 from imaging.features.measurand import measurands
 from imaging.models import DEFAULT_MODEL, variance_model
 from imaging.models.bias import MOST
@@ -22,9 +22,11 @@ from planner.bundles import BundlePrediction, predict_bundle
 from planner.uncertainty.budget import Budget
 from planner.uncertainty.budget import budget as combined
 from scenes import InvalidInput, Picture, Uncertain
+from scenes.board import PITCH
 from scenes.cameras.covariance import ORDER
+from scenes.cameras.estimated import inputs
 
-_ADJUSTED = ("part_shift", "part_tilt_deg", "principal_point_px")
+_ADJUSTED = ("part_shift", "part_tilt_deg", "board_shift", "board_tilt_deg", PITCH, "principal_point_px")
 _OF_SENSORS = ("sensor_deg", "sensor_roll_deg", "sensor_distance")
 _OF_CARRIERS = ("hand_eye", "stage", "turntable")
 
@@ -68,7 +70,9 @@ def bundle_budget(
     """The uncertainty of every measurand of pictures adjusted together; one budget a measurand.
 
     Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``carrier`` (errors of hand_eye, stage and
-    turntable that pictures share), ``carrier 1``, ... (each picture's own), ``camera`` and ``datums``; a sensor that
+    turntable that pictures share), ``carrier 1``, ... (each picture's own), ``camera``,
+    ``estimated`` (``placement.camera``), ``board``, ``board pitch``,
+    ``board points`` and ``datums``; a sensor that
     counts as known has those of its pose, with its number. Where biases are taken off, what that is not sure of
     (``bias by ...``) stands in place of the model error.
 
@@ -124,7 +128,8 @@ def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[So
         here = Station.nominal(features.pictures)
         for each in sources(picture.scene):
             of_sensor = each.name.startswith(_OF_SENSORS)
-            adjusted = each.name.startswith(_ADJUSTED) or each.name in ORDER or (of_sensor and sensors[k] != "known")
+            of_camera = each.name in (*ORDER, *inputs(picture.scene.placement.camera))
+            adjusted = each.name.startswith(_ADJUSTED) or of_camera or (of_sensor and sensors[k] != "known")
             carried = each.name.startswith(_OF_CARRIERS) and "uncertain" in sensors
             if each.kind != "geometry" or adjusted or carried:
                 continue
@@ -166,5 +171,5 @@ def _terms(told: BundlePrediction) -> list[list[Term]]:
 
 
 def _is_place(name: str) -> bool:
-    """Whether a block is the part's place, a sensor's, a carrier's or a camera's numbers, not a datum."""
-    return name == "part" or name.startswith(("sensor ", "camera", "carrier"))
+    """Whether a block is the part's place, a sensor's, a carrier's, a camera's or a board's numbers, not a datum."""
+    return name == "part" or name.startswith(("sensor ", "camera", "estimated", "carrier", BOARD))

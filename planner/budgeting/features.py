@@ -156,7 +156,7 @@ class Features:
     def _board(self, station: Station) -> np.ndarray:
         """Parameters of a board, of which none are where there is none."""
         here, there = self.pictures.scene.placement.board, station.scene.placement.board
-        board = None if self.known.placing is None else self.known.placing.board
+        board = self.known.board
         if here is None or there is None or board is None:
             return np.zeros(0)
         camera = self.pictures.scene.camera

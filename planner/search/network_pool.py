@@ -91,8 +91,9 @@ class Glance:
 
 
 def _parts(seen: Seen) -> list[slice]:
-    """Which numbers are those of each line and circle."""
-    return [slice(2 * e, 2 * e + 2) for e in range(len(seen.names))] + list(map(seen.numbers, range(len(seen.circles))))
+    """Which numbers are those of each line and circle, and of a board."""
+    lines = [slice(2 * e, 2 * e + 2) for e in range(len(seen.names))]
+    return [*lines, *map(seen.numbers, range(len(seen.circles))), *([seen.of_board] if seen.board else [])]
 
 
 class NetworkPool:
@@ -227,7 +228,7 @@ class NetworkPool:
 
 def _whites(bundle: Bundle, covariance: np.ndarray, shown: np.ndarray) -> np.ndarray:
     """Combinations (L, q, q) of lines and circles of covariances (L, q, q), of those that are shown, bool (L, F)."""
-    some = np.array([bundle.seen[0].of_features(each) for each in shown])
+    some = np.array([bundle.seen[0].counted(each) for each in shown])
     some &= np.isfinite(np.einsum("lqq->lq", covariance)) & np.isfinite(bundle.designs[0]).all(1)
     return whitening(np.where(some[:, :, None] & some[:, None, :], covariance, 0.0))
 

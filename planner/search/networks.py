@@ -198,7 +198,7 @@ def of_shared(bundle: Bundle) -> tuple[np.ndarray, np.ndarray]:
 def is_shared(bundle: Bundle) -> np.ndarray:
     """Which unknowns of one picture are not its own: its sensor's, what only it is carried by, and its own camera."""
     shared = np.ones(bundle.unknowns.count, bool)
-    for name in ("sensor 1", "carrier 1", "camera 1"):
+    for name in ("sensor 1", "carrier 1", "camera 1", "estimated 1"):
         if name in bundle.unknowns.slices:
             shared[bundle.unknowns.slices[name]] = False
     return shared

@@ -59,7 +59,13 @@ def covariance(scene: Scene) -> np.ndarray:
         for i, name in enumerate(which):
             rows[i] = [_by_calibrated(name, each, calibrated.names, scene.camera) for each in calibrated.names]
         whole = rows @ np.array(calibrated.matrix) @ rows.T
-    return whole + np.diag([_of_numbers(scene, name) for name in which] + UNTOLD**2 * is_untold(scene))
+    return whole + np.diag(uncalibrated(scene))
+
+
+def uncalibrated(scene: Scene) -> np.ndarray:
+    """Variances of the deviations before a picture, (c,), beside those that a calibration leaves open."""
+    own = np.array([_of_numbers(scene, name) for name in scene.placement.camera])
+    return own + UNTOLD**2 * is_untold(scene)
 
 
 def is_untold(scene: Scene) -> np.ndarray:
