@@ -79,7 +79,7 @@ def propose(
     gradient = np.array([slopes[each] for each in found.names])
     told, now = next_board(found, boards, square_size, gradient), budget[name]
     freed = gradient @ (found.covariance - told.covariance) @ gradient
-    at = middle_of(told.pose, boards[0].shape, square_size)
+    at = middle_of(told.pose, boards[0], square_size)
     image = found.model.seen(found.values, at[None])[0][0]
     normal = cv2.Rodrigues(told.pose[:3])[0][:, 2]
     return Proposal(

@@ -15,8 +15,7 @@ import numpy as np
 
 from measure.boards.camera import CameraCalibration
 from measure.boards.chessboard import Board
-from measure.boards.view import View
-from scenes.board import numbered
+from measure.boards.view import View, on_board
 from scenes.errors import InvalidInput
 
 _PLACES = -0.3, 0.0, 0.3  # of the board's middle, parts of the image's sides beside its middle
@@ -75,22 +74,21 @@ def next_board(
     """
     if not np.isfinite(found.covariance).all():
         raise InvalidInput("boards must determine a camera before another is proposed, got ones that do not")
-    shape, poses = boards[0].shape, candidates(found, boards[0].shape, square_size)
+    places, poses = on_board(boards[0], square_size), candidates(found, boards[0], square_size)
     if not len(poses):
         raise InvalidInput("board must be seen whole from some pose, got none where it is")
     sizes = [np.linalg.det(board.covariance[board.measured]) ** 0.25 for board in boards]
     sigma = np.sqrt(found.dispersion) * float(np.median(np.concatenate(sizes)))
     known = np.linalg.inv(found.covariance)
-    told = [np.linalg.inv(known + information(found, shape, square_size, pose, sigma)) for pose in poses]
+    told = [np.linalg.inv(known + information(found, places, pose, sigma)) for pose in poses]
     variances = np.array([gradient @ each @ gradient for each in told])
     return NextBoard(poses, variances, told[int(variances.argmin())])
 
 
-def information(
-    found: CameraCalibration, shape: tuple[int, int], square_size: float, pose: np.ndarray, sigma: float
-) -> np.ndarray:
-    """What corners known to ``sigma`` px, of a board at an unknown pose about (6,), tell of the camera, (k, k)."""
-    places, flat = _grid(shape, square_size), np.zeros((shape[0] * shape[1], 2))
+def information(found: CameraCalibration, places: np.ndarray, pose: np.ndarray, sigma: float) -> np.ndarray:
+    """What corners (n, 3) known to ``sigma`` px, of a board at an unknown pose about (6,), tell of the camera,
+    (k, k)."""
+    flat = np.zeros((len(places), 2))
     view = View(places, flat, np.broadcast_to(np.eye(2) / sigma, (len(places), 2, 2)), flat)
     by_shared, by_pose = view.jacobian(found.model, found.values, np.zeros(2), pose)
     own = np.linalg.qr(by_pose)[0]
@@ -99,12 +97,14 @@ def information(
     return rest.T @ rest
 
 
-def candidates(found: CameraCalibration, shape: tuple[int, int], square_size: float) -> np.ndarray:
-    """Poses (N, 6) of boards that are whole in the image, outer squares too."""
-    lens, middle = found.lens, _grid(shape, square_size).mean(0)
+def candidates(found: CameraCalibration, board: Board, square_size: float) -> np.ndarray:
+    """Poses (N, 6) of boards that are whole in the image, outer squares, or what is bright around markers, too."""
+    lens, places = found.lens, on_board(board, square_size)
     height, width = found.image_shape
-    outer = _grid((shape[0] + 2, shape[1] + 2), square_size) - [square_size, square_size, 0.0]
-    away, poses = float(np.median([middle_of(pose, shape, square_size)[2] for pose in found.poses])), []
+    middle, half = places.mean(0), np.ptp(places, axis=0) / 2
+    reach = square_size * (1 - board.marker)
+    outer = middle + (places - middle) * (1 + reach / np.where(half > 0, half, np.inf))
+    away, poses = float(np.median([middle_of(pose, board, square_size)[2] for pose in found.poses])), []
     for tilt, towards, roll, nearer, x, y in product(_TILTS, _TOWARDS, _ROLLS, _NEARER, _PLACES, _PLACES):
         axis = np.radians(tilt) * np.array([np.cos(np.radians(towards)), np.sin(np.radians(towards)), 0.0])
         rotation = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, np.radians(roll)]))[0]
@@ -116,11 +116,6 @@ def candidates(found: CameraCalibration, shape: tuple[int, int], square_size: fl
     return np.array(poses).reshape(-1, 6)
 
 
-def _grid(shape: tuple[int, int], square_size: float) -> np.ndarray:
-    """Corners on the board, (n, 3), row by row."""
-    return square_size * np.pad(numbered(*shape), [(0, 0), (0, 1)])
-
-
-def middle_of(pose: np.ndarray, shape: tuple[int, int], square_size: float) -> np.ndarray:
+def middle_of(pose: np.ndarray, board: Board, square_size: float) -> np.ndarray:
     """Where the middle of a board at a pose (6,) is before the camera, (3,), unit of the squares."""
-    return cv2.Rodrigues(pose[:3])[0] @ _grid(shape, square_size).mean(0) + pose[3:]
+    return cv2.Rodrigues(pose[:3])[0] @ on_board(board, square_size).mean(0) + pose[3:]

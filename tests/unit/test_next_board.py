@@ -9,6 +9,7 @@ import pytest
 import measure
 import scenes
 from measure.boards.next_pose import candidates, information, next_board
+from measure.boards.view import on_board
 from scenes import InvalidInput, Picture
 from tests.boards import SMALL, poses, told
 from validation.next_board import propose
@@ -56,6 +57,34 @@ def test_what_a_board_tells_of_a_camera_is_what_a_calibration_with_it_gains(firs
         assert proposed.variances[order[0]] > 1.1 / (1 / before + _of_known_pose(found, proposed.pose, gradient))
 
 
+def test_a_grid_of_markers_is_worth_what_is_told():
+    """Four corners a marker, where they are, some of a photograph not seen: as a calibration with it gains. Negative
+    control: markers' middles alone would tell another variance."""
+    rig, share, rng = replace(SMALL, board=(4, 3), square=46.0), 0.7, np.random.default_rng(3)
+    given, seen = [], poses(rig, 4, np.random.default_rng(4), 420.0)
+
+    def of(pose):
+        truth = rig.marker_corners(pose, share)
+        covariance = np.broadcast_to(SIGMA**2 * np.eye(2), (len(truth), 2, 2)).copy()
+        board = told(truth + SIGMA * rng.standard_normal(truth.shape), covariance, rig.board)
+        return replace(board, marker=share)
+
+    given = [of(pose) for pose in seen]
+    given[0] = replace(given[0], status=("not_visible",) * 8 + given[0].status[8:])
+    found = measure.calibrate_camera(given, rig.square, SHAPE, model="k1,k2,p1,p2")
+    gradient = np.array([float(name == "fx") for name in found.names])
+    proposed = next_board(found, given, rig.square, gradient)
+    now = measure.calibrate_camera([*given, of(proposed.pose)], rig.square, SHAPE, model="k1,k2,p1,p2")
+    assert gradient @ now.covariance @ gradient == pytest.approx(proposed.variances[proposed.best], rel=0.1)
+    for pose in proposed.poses[::20]:
+        there = rig.marker_corners(pose, share)
+        assert (there > 4).all()
+        assert (there < np.array(rig.size) - 5).all()
+    few = replace(given[1], marker=0.0, corners=given[1].corners[::4])
+    known = np.linalg.inv(found.covariance) + information(found, on_board(few, rig.square), proposed.pose, SIGMA)
+    assert gradient @ np.linalg.inv(known) @ gradient > 1.2 * proposed.variances[proposed.best]
+
+
 def _of_known_pose(found, pose, gradient):
     """Information about one number by a board whose pose is known, the others as they are."""
     places = np.mgrid[: SMALL.board[1], : SMALL.board[0]].reshape(2, -1)[::-1].T
@@ -68,12 +97,14 @@ def _of_known_pose(found, pose, gradient):
 
 def test_candidates_are_whole_in_the_image(first):
     found = first[2]
-    for pose in candidates(found, SMALL.board, SMALL.square)[::20]:
+    board = boards(first[0][:1], np.random.default_rng(1))[0]
+    for pose in candidates(found, board, SMALL.square)[::20]:
         there = SMALL.corners(pose)
         assert (there > 4).all()
         assert (there < np.array(SMALL.size) - 5).all()
-    small = information(found, SMALL.board, SMALL.square, first[0][0], 0.02)
-    np.testing.assert_allclose(4 * small, information(found, SMALL.board, SMALL.square, first[0][0], 0.01))
+    places = on_board(board, SMALL.square)
+    small = information(found, places, first[0][0], 0.02)
+    np.testing.assert_allclose(4 * small, information(found, places, first[0][0], 0.01))
 
 
 def test_u_of_a_measurand_falls_as_told(first):
