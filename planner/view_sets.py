@@ -19,13 +19,15 @@ class View:
 
     Attributes
     ----------
-    sensor, light : Pose
+    sensor : Pose
+    light : Pose or tuple of Pose
+        Of the free light, or of each.
     prediction : Prediction
         Of this picture alone, looked at closely.
     """
 
     sensor: Pose
-    light: Pose
+    light: Pose | tuple[Pose, ...]
     prediction: Prediction
 
 

@@ -14,7 +14,7 @@ from planner.constraints import Constraints
 from planner.planning import COARSE_STEP
 from planner.search.candidates import SettingUp
 from planner.search.exhaustive import has_bound
-from planner.search.grid import Grid
+from planner.search.grid import Grid, as_poses
 from planner.search.objective import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over, Report, SearchProblem
 from planner.search.sets import (
     MOST_SETS,
@@ -28,6 +28,7 @@ from planner.search.sets import (
     greedy,
     least_value,
     sets_of,
+    settings_of,
     undominated,
     undominated_shared,
 )
@@ -64,7 +65,8 @@ def plan_views(
 
     All pairs of a grid are evaluated fast; of those that no other can stand in for, sets are chosen greedily with
     exchange. What is chosen is ray-traced (clutter, light between surfaces), and chosen again, until all that is chosen
-    has been; then the poses of each picture descend, those of the others held.
+    has been; then the poses of each picture descend, those of the others held. Of several free lights each sensor of
+    the grid has those that are best for all quantities together, and for each alone, with the scene's intensities.
 
     Parameters
     ----------
@@ -79,7 +81,8 @@ def plan_views(
         Grid step; by default 5 where a pair takes microseconds (convex, diffuse, straight edges) and nothing is
         shared, else 10 degrees.
     share : {"sensor", "light"}, optional
-        Hold one the same in all pictures of a set: one camera and several lamps, or the reverse. Not refined.
+        Hold one the same in all pictures of a set: one camera and several lamps, or the reverse. Not refined; of one
+        free light.
 
     Raises
     ------
@@ -94,8 +97,8 @@ def plan_views(
     1.0
     """
     aim = _aim(scene, count, objective, over, model, share)
-    if len(scene.lights) != 1 or not scene.free:
-        raise InvalidInput(f"lights must be one that is free, for several pictures, got {len(scene.lights)} light(s)")
+    if share is not None and len(scene.free) != 1:
+        raise InvalidInput(f"share must be left out unless one light is free, got {share!r} of {len(scene.free)}")
     if not scene.placement.is_known:
         raise InvalidInput(f"placement.from must be known for several pictures, got {scene.placement.source!r}")
     report, limits = report or (lambda *_: None), (constraints or Constraints()).on_side_of(scene)
@@ -104,16 +107,33 @@ def plan_views(
     step = (_FINE_STEP if fast else COARSE_STEP) if step_deg is None else step_deg
     grid = Grid.of(scene, problem.constraints, step, sensor, light)
     pairs = _checked_size(grid, len(scene.quantities))
-    told = fast_table(problem, grid.sensors, grid.lights, report)
+    told, poses = _glanced(problem, grid, report)
     if not told.any():
         raise InvalidInput("constraints must leave a setting that can measure, got none")
-    pool, groups = _pool(problem, grid, told, share, count)
+    pool, groups = _pool(problem, grid, poses, told, share, count)
     _trace(pool, groups, count, report)
     if refined and grid.free and share is None:
         _refine(pool, count, step, report)
-    bounds, most = _bounds(aim, told, count) if share is None else ([None] * count, None)
+    is_whole = share is None and len(scene.free) < 2
+    bounds, most = _bounds(aim, told, count) if is_whole else ([None] * count, None)
     sets = _sets(pool, groups, count, bounds)
-    return Views(scene, aim.over, model, share, sets, pairs, len(pool.traced), _guarantee(step, share), most)
+    guarantee = _guarantee(step, share, len(scene.free))
+    return Views(scene, aim.over, model, share, sets, pairs, len(pool.traced), guarantee, most)
+
+
+def _glanced(problem: SearchProblem, grid: Grid, report: Report) -> tuple[np.ndarray, np.ndarray]:
+    """What settings of a grid tell by fast evaluation, (S, L, M), and their poses (S, L, 2 + 2 F).
+
+    All pairs; of several free lights each sensor with those that are best for all quantities together, and for each
+    alone.
+    """
+    if len(problem.scene.free) > 1 and not grid.held[1]:
+        poses, told = settings_of(problem, grid, report)
+        return told[:, None], poses[:, None]
+    told = fast_table(problem, grid.sensors, grid.lights, report)
+    sensors = np.broadcast_to(grid.sensors[:, None], (*told.shape[:2], 2))
+    lights = np.broadcast_to(grid.lights, (*told.shape[:2], grid.lights.shape[1]))
+    return told, np.concatenate([sensors, lights], -1)
 
 
 def _checked_size(grid: Grid, quantities: int) -> int:
@@ -140,14 +160,13 @@ def _aim(scene: Scene, count: int, objective: str, over: str, model: str, share:
 
 
 def _pool(
-    problem: SearchProblem, grid: Grid, told: np.ndarray, share: str | None, count: int
+    problem: SearchProblem, grid: Grid, poses: np.ndarray, told: np.ndarray, share: str | None, count: int
 ) -> tuple[Pool, np.ndarray | None]:
     """The candidates, and which of them share a place."""
     aim = problem.objective
     rows = undominated(told, aim) if share is None else undominated_shared(told, aim, share, count)
     s, k = np.unravel_index(rows, told.shape[:2])
-    poses = np.concatenate([grid.sensors[s], grid.lights[k]], 1)
-    pool = Pool(SettingUp(problem, grid.held), poses, told.reshape(-1, told.shape[-1])[rows])
+    pool = Pool(SettingUp(problem, grid.held), poses[s, k], told.reshape(-1, told.shape[-1])[rows])
     return pool, None if share is None else s if share == "sensor" else k
 
 
@@ -258,13 +277,13 @@ def _exhaustive(table: PictureInformation, rows: np.ndarray, groups: np.ndarray 
 
 
 def _view(pool: Pool, row: int) -> View:
-    sensor, light = (Pose(*map(float, pool.poses[row, part])) for part in (slice(0, 2), slice(2, 4)))
-    return View(sensor, light, pool.traced[row])
+    sensor, lights = pool.setting(row)
+    return View(Pose(*map(float, sensor)), as_poses(lights), pool.traced[row])
 
 
-def _guarantee(step: float, share: str | None) -> str:
+def _guarantee(step: float, share: str | None, lights: int) -> str:
     held = "" if share is None else f", the same {share} in all"
-    return (
-        f"no exchange of one picture for another that was looked at makes a set better{held}; of all pairs of the"
-        f" {step:g} degree grid only the bound is known"
-    )
+    rest = f"of all pairs of the {step:g} degree grid only the bound is known"
+    if lights > 1:
+        rest = "where else several lights might stand is not known"
+    return f"no exchange of one picture for another that was looked at makes a set better{held}; {rest}"

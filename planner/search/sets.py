@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, islice
 from typing import Protocol
 
@@ -17,6 +17,8 @@ import numpy as np
 from imaging.geometry.projection import direction
 from planner.prediction import Prediction, predict
 from planner.search.candidates import DEAREST, SettingUp
+from planner.search.grid import Grid, as_poses
+from planner.search.lights import best_lights
 from planner.search.local import refine
 from planner.search.objective import Aim, Report, SearchProblem
 from scenes.status import is_trusted
@@ -274,6 +276,27 @@ def fast_table(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, 
     return told
 
 
+def settings_of(problem: SearchProblem, grid: Grid, report: Report) -> tuple[np.ndarray, np.ndarray]:
+    """Sensors of a grid, each with the several lights that are best for all quantities, and for each alone.
+
+    Settings (P, 2 + 2 F), and their information (P, M); 0 where not feasible.
+    """
+    scene, poses, told = problem.scene, [], []
+    for each in [problem, *(_of_one(problem, m) for m in range(len(scene.measurands)) if len(scene.measurands) > 1)]:
+        lights = best_lights(each, grid, "given", report).lights
+        allowed = problem.constraints.allowed(scene, grid.sensors, lights)
+        variances = problem.errors(grid.sensors, lights).variances_object
+        poses.append(np.concatenate([grid.sensors, lights], 1))
+        told.append(information(variances, problem.objective) * allowed[:, None])
+    return np.concatenate(poses), np.concatenate(told)
+
+
+def _of_one(problem: SearchProblem, m: int) -> SearchProblem:
+    """Of the m-th quantity alone."""
+    scene = problem.scene.tried(measurands=(problem.scene.measurands[m],))
+    return replace(problem, scene=scene, objective=Aim.of(scene.quantities, problem.objective.unit))
+
+
 def undominated(told: np.ndarray, aim: Aim) -> np.ndarray:
     """Flat indices of pairs that no other dominates, and each sensor's best for the objective and each measurand."""
     flat = told.reshape(-1, told.shape[-1])
@@ -322,8 +345,8 @@ class Pool:
     ----------
     ways : SettingUp
         Of the search problem's sensor and light.
-    poses : ndarray, shape (P, 4)
-        Sensor and light, each polar angle and azimuth, degrees, to the digits at which they are set up.
+    poses : ndarray, shape (P, 2 + 2 F)
+        Sensor and free lights, each polar angle and azimuth, degrees, to the digits at which they are set up.
     told : ndarray, shape (P, M)
         Their information by fast evaluation (`information`).
     traced : dict
@@ -334,16 +357,20 @@ class Pool:
 
     def __init__(self, ways: SettingUp, poses: np.ndarray, told: np.ndarray) -> None:
         self.ways, self.problem, self.told = ways, ways.problem, told
-        self.poses = np.concatenate(ways.to_digits(*np.split(poses, 2, axis=1)), axis=1)
+        self.poses = np.concatenate(ways.to_digits(poses[:, :2], poses[:, 2:]), axis=1)
         self.traced: dict[int, Prediction] = {}
         self.steady: dict[int, np.ndarray] = {}
 
     def trace(self, row: int) -> None:
         """Ray-traced evaluation of a row, once."""
         if row not in self.traced:
-            sensor, light = (tuple(map(float, part)) for part in np.split(self.poses[row], 2))
-            self.traced[row] = predict(self.problem.scene, sensor, light, self.problem.model)
-            self.steady[row] = self.ways.steady(*np.split(self.poses[row], 2))
+            sensor, lights = self.setting(row)
+            self.traced[row] = predict(self.problem.scene, tuple(sensor.tolist()), as_poses(lights), self.problem.model)
+            self.steady[row] = self.ways.steady(sensor, lights)
+
+    def setting(self, row: int) -> tuple[np.ndarray, np.ndarray]:
+        """Sensor (2,) and free lights (2 F,) of a row."""
+        return self.poses[row, :2], self.poses[row, 2:]
 
     def add(self, sensor: np.ndarray, light: np.ndarray, told: np.ndarray) -> int:
         """A further row, poses to their digits; its number."""
@@ -372,8 +399,8 @@ class Pool:
         seen = self.seen
         if len(seen):
             known = self.known()
-            sensors, lights = direction(self.poses[:, :2]), direction(self.poses[:, 2:])
-            cosine = np.minimum(sensors @ sensors[seen].T, lights @ lights[seen].T)
+            ways = [direction(self.poses[:, i : i + 2]) for i in range(0, self.poses.shape[1], 2)]
+            cosine = np.min([each @ each[seen].T for each in ways], 0)
             nearest = cosine.argmax(1)
             beside = cosine[np.arange(len(cosine)), nearest] > np.cos(np.radians(_ALIKE))
             cluttered = (known.clutter > 0)[nearest] & beside[:, None]
@@ -393,7 +420,7 @@ class Pool:
         What is clutter in the row is taken to stay so on the way. If ray-traced evaluation does not bear out what the
         fast one told, a shorter search is tried.
         """
-        sensor, light = np.split(self.poses[row], 2)
+        sensor, light = self.setting(row)
         cluttered = np.array([not is_trusted(each.status) for each in self.traced[row].measurands])
 
         def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:

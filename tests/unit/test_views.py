@@ -8,7 +8,10 @@ import pytest
 import planner
 import scenes
 from planner import views
-from planner.search.objective import Aim
+from planner.constraints import Constraints
+from planner.search.grid import Grid
+from planner.search.objective import Aim, SearchProblem
+from planner.search.sets import all_ok, fast_table, least_value, settings_of
 from tests.sides import sides
 
 
@@ -83,6 +86,48 @@ def test_one_quantity_is_best_measured_by_repeats(task1):
 def test_held_sensor(task1):
     found = planner.plan_views(task1, 2, step_deg=30, sensor=(30, 135))
     assert {tuple(view.sensor) for each in found.sets for view in each.views} == {(30.0, 135.0)}
+
+
+LIT_BY_TWO = {"lights": [{"distance": 100.0, "intensity": 0.6}, {"distance": 100.0, "intensity": 0.4}]}
+
+
+def lit_by_two(scene):
+    document = scene.model_dump(by_alias=True, mode="json", exclude={"lights", "light"}, exclude_none=True)
+    return scenes.Scene.model_validate(document | LIT_BY_TWO)
+
+
+def test_lights_of_sets_are_nearly_the_best_of_all(tmp_path):
+    """Front, height and top, two lights: what is minimised beside the least of all sensors with all pairs of lights'
+    places, by a glance; negative control: of each sensor the lights alone that are best for all together."""
+    scene = lit_by_two(sides(tmp_path, "front", "height", "top"))
+    problem = SearchProblem(scene, "calibrated", Aim.of(scene.quantities, "object"), Constraints().on_side_of(scene))
+    grid = Grid.of(scene, problem.constraints, 45)
+    lights = np.array([[*a, *b] for a in grid.lights for b in grid.lights])
+    every = fast_table(problem, grid.sensors, lights, lambda *_: None).reshape(-1, 3)
+    poses, few = settings_of(problem, grid, lambda *_: None)
+    assert poses.shape == (4 * len(grid.sensors), 6)
+    for size in (1, 2, 3):
+        least, found, joint = (
+            least_value(all_ok(told, problem.objective), size) for told in (every, few, few[: len(grid.sensors)])
+        )
+        assert 1 - 1e-9 <= found / least < 1.05
+        assert joint / least > 1.3
+
+
+def test_opposite_sides_under_two_lights_need_two_pictures(tmp_path):
+    found = planner.plan_views(lit_by_two(sides(tmp_path, "front", "back")), 2, step_deg=45, refined=False)
+    assert all(len(view.light) == 2 for view in found.sets[1].views)
+    assert found.sets[1].bound is None
+    assert len(found.sets[0].lost) == 1
+    assert found.sets[1].lost == ()
+    with pytest.raises(scenes.InvalidInput, match="share must be left out unless one light is free, got 'light' of 2"):
+        planner.plan_views(found.scene, 2, share="light")
+
+
+def test_no_light_is_free():
+    found = planner.plan_views(scenes.load("backlight_plate"), 2, step_deg=60, refined=False)
+    assert all(view.light == () for view in found.sets[1].views)
+    assert found.sets[1].minimised <= found.sets[0].minimised / 2 * (1 + 1e-9)  # margin: half is what a repeat gives
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def _set(each: planner.ViewSet) -> dict:
     both, first = each.combination, each.views[0].prediction.measurands
     return {
         "count": len(each.views),
-        "poses": [{"sensor": list(view.sensor), "light": list(view.light)} for view in each.views],
+        "poses": [{"sensor": list(view.sensor), "light": scenes.pairs(view.light)} for view in each.views],
         **picked(each, "minimised", "worst_ratio", "limiting"),
         "lost": list(each.lost),
         "hard": list(each.hard),

@@ -9,7 +9,6 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
-from scenes import Pose
 from scenes.status import legend
 from validation.report.cells import number as _number
 from validation.report.cells import pose as _pose
@@ -124,7 +123,7 @@ def _searched(found: planner.Views, seconds: float) -> str:
 
 def _repeated(found: planner.Views) -> list[str]:
     """Pictures of the largest set that are taken from one place, in words."""
-    places: dict[tuple[Pose, Pose], list[str]] = {}
+    places: dict[tuple, list[str]] = {}
     for number, view in enumerate(found.sets[-1].views, 1):
         places.setdefault((view.sensor, view.light), []).append(str(number))
     return [f"No. {' and '.join(each)} are taken from one place" for each in places.values() if len(each) > 1]
