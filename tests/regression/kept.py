@@ -84,6 +84,22 @@ def _alike(said: str, told: str, tolerance: str) -> bool:
     return abs(float(one[1]) - float(other[1])) <= float(tolerance)
 
 
+def loosened(stored: Kept, runs: dict[str, dict[str, list[Call]]]) -> Kept:
+    """The same without what runs by case and function on one more processor do not give."""
+    found: Kept = {}
+    for function, cases in stored.items():
+        for case, lines in cases.items():
+            calls = runs[case].get(function)
+            one_by_one = [[each if way == k else _NO for k, each in enumerate(lines)] for way in range(len(lines))]
+            left = [
+                each if not list(_of_function(function, alone, calls)) else _NO
+                for each, alone in zip(lines, one_by_one, strict=True)
+            ]
+            if left != [_NO] * len(left):
+                found.setdefault(function, {})[case] = left
+    return found
+
+
 def line(runs: list[list[Digest]]) -> str:
     """What is stored of a function's calls in a case, of the same in several runs; `_NO` where these do not agree."""
     if len({len(run) for run in runs}) > 1 or all(each == NOTHING for each in runs[0]):
