@@ -1,8 +1,9 @@
-"""Triangles as files have them, brought to a closed surface: doubled ones, gaps, inverted shells, edges used twice."""
+"""Triangles as files have them, brought to a closed surface: doubled ones, gaps, T-junctions, inverted shells."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import trimesh
@@ -39,7 +40,7 @@ def mended(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
     mesh.face_attributes["source"] = np.arange(len(mesh.faces))
     said: list[str] = []
     whole = mesh.is_watertight and mesh.is_winding_consistent
-    for step in (_outwards,) if whole else (_without_doubled, _closed_gaps, _one_way, _parted, _outwards):
+    for step in (_outwards,) if whole else (_without_doubled, _closed_gaps, _divided, _one_way, _parted, _outwards):
         mesh, done = step(mesh)
         said += done
     if not len(mesh.faces):
@@ -91,6 +92,41 @@ def _closed_gaps(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     whole = (faces != np.roll(faces, 1, 1)).all(1)
     joined = _of(mesh, mesh.vertices[first], faces[whole], np.flatnonzero(whole))
     return joined, [f"vertices of open edges joined: {len(mesh.vertices) - len(first)}"] if len(near) else []
+
+
+def _divided(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
+    """Triangles divided where corners of others lie on their open edges."""
+    halves = np.sort(_halves(mesh.faces), 1)
+    edges, which = different(halves)
+    alone = np.flatnonzero(np.bincount(which) % 2)
+    if not alone.size:
+        return mesh, []
+    faces, sources, count = mesh.faces.tolist(), list(range(len(mesh.faces))), 0
+    pieces = {i: [i] for i in range(len(faces))}
+    for edge, between in zip(alone, _between(mesh.vertices, edges[alone]), strict=True):
+        start, stop = edges[edge].tolist()
+        count += len(between)
+        for face in np.flatnonzero(which == edge) % len(mesh.faces) if between else ():
+            for last, corner in pairwise([start, *between]):
+                _halved(faces, pieces[face], {last, stop}, corner)
+                sources.append(int(face))
+    if not count:
+        return mesh, []
+    found = _of(mesh, mesh.vertices, np.array(faces), np.array(sources))
+    return found, [f"corners on open edges, whose triangles were divided there: {count}"]
+
+
+def _between(vertices: np.ndarray, edges: np.ndarray) -> Iterator[list[int]]:
+    """Of open edges (n, 2) each the ends of others that lie on it, from its first end to its second."""
+    rim, near = np.unique(edges), _GAP * float(np.ptp(vertices, axis=0).max())
+    start, way = vertices[edges[:, 0]], np.diff(vertices[edges], axis=1)[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    for row, some in enumerate(KDTree(vertices[rim]).query_ball_point(start + way / 2, length / 2)):
+        away = vertices[rim[some]] - start[row]
+        along = away @ way[row] / length[row]
+        aside = np.linalg.norm(away - along[:, None] * way[row] / length[row], axis=1)
+        on = (aside <= near) & (along > near) & (along < length[row] - near)
+        yield rim[some][on][np.argsort(along[on])].tolist()
 
 
 def _one_way(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:

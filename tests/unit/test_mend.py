@@ -116,6 +116,26 @@ def test_an_open_edge_that_is_a_small_gap_is_closed():
         mended(far)
 
 
+@pytest.mark.parametrize("times", [1, 2])
+def test_corners_on_an_edge_divide_its_triangle(times):
+    """A lid of smaller triangles than the walls below it: halves and quarters of its four edges."""
+    part = box()
+    lid = (part.triangles[:, :, 2] > 5.9).all(1)
+    fine = trimesh.Trimesh(part.vertices, part.faces[lid], process=False)
+    for _ in range(times):
+        fine = fine.subdivide()
+    joined = of(trimesh.Trimesh(part.vertices, part.faces[~lid], process=False), fine)
+    joined.vertices += [1e-7, 0, 0] * (np.arange(len(joined.vertices)) % 2)[:, None]  # digits of a file in text
+    found, said = mended(joined.copy())
+    joints = 4 * (2**times - 1)
+    assert said[-1] == f"corners on open edges, whose triangles were divided there: {joints}"
+    assert two_sided(found)
+    assert found.volume == pytest.approx(72.0, abs=1e-5)
+    solid = mesh.solid(joined)
+    assert (len(solid.faces), len(solid.sharp), len(solid.corner_names)) == (6, 12, 8)
+    assert not (np.diff(found.triangles[:, [0, 1, 2, 0]], axis=1) == 0).all(-1).any()
+
+
 def test_triangles_that_look_the_other_way_are_turned():
     part = box()
     faces = part.faces.copy()
