@@ -266,9 +266,9 @@ def test_pieces_of_a_turn(kernel, faces, most, pieces):
     [
         ({"status": 0}, "a readable STEP file, got something else"),
         ({"roots": 0}, "of a solid body, got none"),
-        ({"shapes": 0}, "of a solid body, got none"),
-        ({"whole": body(plain("f"), solid=False)}, "of a solid body, got none"),
-        ({"whole": body()}, "of a solid body, got none"),
+        ({"shapes": 0}, "of a solid body, got none$"),
+        ({"whole": body(plain("f"), solid=False)}, r"got none \(faces that enclose no body: 1\)$"),
+        ({"whole": body()}, "of a solid body, got none$"),
         ({"whole": body(*map(plain, "fgh"))}, "of at most 2 faces, got 3"),
     ],
 )
@@ -278,6 +278,14 @@ def test_what_is_no_body_is_refused(kernel, change, match):
     kernel.__dict__.update(change)
     with pytest.raises(Unusable, match=match):
         step_kernel.record(b"data", 96, 2)
+
+
+def test_an_assembly_of_other_files_names_them(kernel):
+    """Whose parts a file refers to, and has no body of its own."""
+    kernel.roots = 0
+    others = b"#3=DOCUMENT_FILE('lid.stp','','',#4,'',$) ;\n#7 = DOCUMENT_FILE ( 'box.stp','','',#8,'',$);"
+    with pytest.raises(Unusable, match=r"got none \(it names other files: 'lid.stp', 'box.stp'\)$"):
+        step_kernel.record(others, 96, 2)
 
 
 @pytest.mark.parametrize(
