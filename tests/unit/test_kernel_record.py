@@ -73,7 +73,7 @@ def kernel(monkeypatch):
     entity = lambda face, _: said.names.get(face.name)  # noqa: E731
 
     class Reader:
-        ReadStream = staticmethod(lambda name, data: said.status if data.read() == b"data" else 0)
+        ReadStream = staticmethod(lambda name, data: said.status if data.read().startswith(b"data") else 0)
         TransferRoots = staticmethod(lambda: said.roots)
         NbShapes = staticmethod(lambda: said.shapes)
         OneShape = staticmethod(lambda: said.whole)
@@ -283,7 +283,7 @@ def test_what_is_no_body_is_refused(kernel, change, match):
 def test_an_assembly_of_other_files_names_them(kernel):
     """Whose parts a file refers to, and has no body of its own."""
     kernel.roots = 0
-    others = b"#3=DOCUMENT_FILE('lid.stp','','',#4,'',$) ;\n#7 = DOCUMENT_FILE ( 'box.stp','','',#8,'',$);"
+    others = b"data #3=DOCUMENT_FILE('lid.stp','','',#4,'',$) ;\n#7 = DOCUMENT_FILE ( 'box.stp','','',#8,'',$);"
     with pytest.raises(Unusable, match=r"got none \(it names other files: 'lid.stp', 'box.stp'\)$"):
         step_kernel.record(others, 96, 2)
 
