@@ -56,7 +56,7 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
         solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
             found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted)
-        except Unusable as error:
+        except Exception as error:  # the kernel's own are of many types; another way may do
             found, broken = [], error
         outcomes.append(bool(found))
         if found and _is_closed(found):

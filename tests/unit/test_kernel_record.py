@@ -215,6 +215,11 @@ def test_ways_to_a_closed_surface(kernel):
     found = step_kernel.record(b"data", 96, 2000)
     assert tried == [96, *coarser, 96]
     assert (len(found["faces"][0]["triangles"]), found["segments"]) == (4, 96)
+    tried.clear()
+    kernel.splined = lambda shape: {}["BSpline curve: Knots interval values too close"]
+    found = step_kernel.record(b"data", 96, 2000)  # a way at which the kernel breaks down is one that does not help
+    assert tried == [96, *coarser[:-1], 96]
+    assert (len(found["faces"][0]["triangles"]), found["segments"]) == (3, 96)
 
 
 def test_faces_that_cannot_be_cut_are_refused(kernel, monkeypatch):
