@@ -11,6 +11,24 @@ from scenes.units import UNITS, Unit, in_unit, times_apart
 _LARGE, _SMALL = 4.0, 0.1  # times the field of view: then a unit that fits better is likely meant
 _ANY_LARGE, _ANY_SMALL = 500.0, 1e-4  # the same where the file's unit is stated: beyond any task
 _FITS = 0.05, 1.6  # a part that a camera is set up for
+_TINY_MM = 1.0  # a part that is smaller is likely one in another unit
+_COMMON_MM = 5.0, 2000.0  # of parts
+
+
+def units_meant(solid: Solid, unit: Unit) -> tuple[Unit, ...]:
+    """Units that the numbers of a file may be in, where the part, taken for ``unit``, is less than a millimetre large.
+
+    Examples
+    --------
+    >>> from scenes.parts.solid import block
+    >>> units_meant(block((0.06, 0.04, 0.02)), "mm"), units_meant(block((60, 40, 20)), "mm")
+    (('m',), ())
+    """
+    size = float(np.ptp(solid.vertices, axis=0).max())
+    if in_unit(size, unit, "mm") >= _TINY_MM:
+        return ()
+    least, most = _COMMON_MM
+    return tuple(other for other in UNITS if least <= in_unit(size, other, "mm") <= most)
 
 
 def check_view(solid: Solid, camera: Camera, unit: Unit, file_unit: Unit | None, is_mesh: bool) -> None:

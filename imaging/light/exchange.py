@@ -257,10 +257,13 @@ class Exchanged:
 
     def sent_at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """What points (n, 3) within faces (n,) send on of what arrives there."""
-        exchange, found, some = self.exchange, np.zeros(len(points)), self.exchange.has[faces]
-        normals = normals_at(exchange.solid, faces[some], points[some])
-        met = exchange.met(points[some], normals, _FROM_PIECE, in_unit_square(len(normals)))
-        found[some] = _white(self.scene, faces[some]) * self.gathered(met, len(normals), _FROM_PIECE)
+        exchange, found, some = self.exchange, np.zeros(len(points)), np.flatnonzero(self.exchange.has[faces])
+        shifts, size = in_unit_square(len(some)), _AT_ONCE // _FROM_PIECE  # in blocks, which bounds the memory
+        for at in range(0, len(some), size):
+            here = some[at : at + size]
+            normals = normals_at(exchange.solid, faces[here], points[here])
+            met = exchange.met(points[here], normals, _FROM_PIECE, shifts[at : at + size])
+            found[here] = _white(self.scene, faces[here]) * self.gathered(met, len(here), _FROM_PIECE)
         return found
 
     def gathered(self, met: Hits, count: int, rays: int | np.ndarray) -> np.ndarray:

@@ -75,12 +75,13 @@ def chosen(bodies: dict[str, trimesh.Trimesh], body: str | int | None) -> trimes
 
 
 def listed(names: list[str]) -> str:
-    """Numbers and names of bodies, in one line.
+    """Numbers and names of bodies, in one line; without names that are numbers, as of objects that have none (3MF).
 
-    >>> listed(["lid", "", "box"])
-    "1 'lid', 2, 3 'box'"
+    >>> listed(["lid", "", "box", "1"])
+    "1 'lid', 2, 3 'box', 4"
     """
-    told = [f"{number} {name!r}" if name else str(number) for number, name in enumerate(names[:_NAMED], 1)]
+    named = enumerate(names[:_NAMED], 1)
+    told = [f"{number} {name!r}" if name and not name.isdecimal() else str(number) for number, name in named]
     return ", ".join(told) + (f", ... {len(names)}" if len(names) > _NAMED else "")
 
 

@@ -1,8 +1,9 @@
-"""Triangles as files have them, brought to a closed surface: doubled ones, gaps, inverted shells, edges used twice."""
+"""Triangles as files have them, brought to a closed surface: doubled ones, gaps, T-junctions, slits, shells turned."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import trimesh
@@ -14,6 +15,8 @@ from scenes.errors import InvalidInput
 from scenes.parts.rows import different
 
 _GAP = 1e-5  # of the part's size: open edges that lie closer are one
+_SLIT = 3e-4  # of the part's size: what is open and narrower is filled
+_MOST_AROUND = 64  # corners of a slit
 _SAME = 1e-5  # rad, between triangles of one plane
 _SAID = 3  # places of open edges
 
@@ -39,7 +42,8 @@ def mended(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
     mesh.face_attributes["source"] = np.arange(len(mesh.faces))
     said: list[str] = []
     whole = mesh.is_watertight and mesh.is_winding_consistent
-    for step in (_outwards,) if whole else (_without_doubled, _closed_gaps, _one_way, _parted, _outwards):
+    ways = _without_doubled, _closed_gaps, _divided, _filled, _one_way, _parted, _outwards
+    for step in ways[-1:] if whole else ways:
         mesh, done = step(mesh)
         said += done
     if not len(mesh.faces):
@@ -91,6 +95,90 @@ def _closed_gaps(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     whole = (faces != np.roll(faces, 1, 1)).all(1)
     joined = _of(mesh, mesh.vertices[first], faces[whole], np.flatnonzero(whole))
     return joined, [f"vertices of open edges joined: {len(mesh.vertices) - len(first)}"] if len(near) else []
+
+
+def _divided(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
+    """Triangles divided where corners of others lie on their open edges."""
+    halves = np.sort(_halves(mesh.faces), 1)
+    edges, which = different(halves)
+    alone = np.flatnonzero(np.bincount(which) % 2)
+    if not alone.size:
+        return mesh, []
+    faces, sources, count = mesh.faces.tolist(), list(range(len(mesh.faces))), 0
+    pieces = {i: [i] for i in range(len(faces))}
+    for edge, between in zip(alone, _between(mesh.vertices, edges[alone]), strict=True):
+        start, stop = edges[edge].tolist()
+        count += len(between)
+        for face in np.flatnonzero(which == edge) % len(mesh.faces) if between else ():
+            for last, corner in pairwise([start, *between]):
+                _halved(faces, pieces[face], {last, stop}, corner)
+                sources.append(int(face))
+    if not count:
+        return mesh, []
+    found = _of(mesh, mesh.vertices, np.array(faces), np.array(sources))
+    return found, [f"corners on open edges, whose triangles were divided there: {count}"]
+
+
+def _between(vertices: np.ndarray, edges: np.ndarray) -> Iterator[list[int]]:
+    """Of open edges (n, 2) each the ends of others that lie on it, from its first end to its second."""
+    rim, near = np.unique(edges), _GAP * float(np.ptp(vertices, axis=0).max())
+    start, way = vertices[edges[:, 0]], np.diff(vertices[edges], axis=1)[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    for row, some in enumerate(KDTree(vertices[rim]).query_ball_point(start + way / 2, length / 2)):
+        away = vertices[rim[some]] - start[row]
+        along = away @ way[row] / length[row]
+        aside = np.linalg.norm(away - along[:, None] * way[row] / length[row], axis=1)
+        on = (aside <= near) & (along > near) & (along < length[row] - near)
+        yield rim[some][on][np.argsort(along[on])].tolist()
+
+
+def _filled(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
+    """Slits closed by triangles, each a part of the face beside its longest edge."""
+    halves = _halves(mesh.faces)
+    _, which = different(np.sort(halves, 1))
+    alone = np.flatnonzero(np.bincount(which)[which] == 1)
+    beside = {tuple(half): int(k) % len(mesh.faces) for half, k in zip(halves[alone].tolist(), alone, strict=True)}
+    added, sources, widths = [mesh.faces], list(range(len(mesh.faces))), []
+    for loop in _loops(list(beside)):
+        corners = mesh.vertices[loop]
+        lengths = np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1)
+        area, fan = _fan(corners)
+        width = 2 * area / lengths.sum()
+        if width <= _SLIT * mesh.extents.max():
+            longest = int(lengths.argmax())
+            added.append(np.array(loop)[fan])
+            sources += [beside[loop[(longest + 1) % len(loop)], loop[longest]]] * len(fan)
+            widths.append(width)
+    if not widths:
+        return mesh, []
+    found = _of(mesh, mesh.vertices, np.concatenate(added), np.array(sources))
+    return found, [f"slits filled, {max(widths):.2g} wide at most: {len(widths)}"]
+
+
+def _loops(halves: list[tuple[int, int]]) -> Iterator[list[int]]:
+    """Closed ways around what is open, against the edges of the triangles beside it; no long ones."""
+    onward: dict[int, list[int]] = {}
+    for start, stop in halves:
+        onward.setdefault(stop, []).append(start)
+    while onward:
+        way = [next(iter(onward))]
+        while way[-1] in onward and (len(way) == 1 or way[-1] != way[0]):
+            there = onward[way[-1]]
+            if len(there) == 1:
+                del onward[way[-1]]
+            way.append(there.pop())
+        if way[-1] == way[0] and len(way) <= _MOST_AROUND:
+            yield way[:-1]
+
+
+def _fan(corners: np.ndarray) -> tuple[float, np.ndarray]:
+    """The area of the triangles (n - 2, 3) from one corner of a loop (n, 3) to the others: from that of the least."""
+    n = len(corners)
+    turns = (np.arange(n) + np.arange(n)[:, None]) % n
+    fans = np.stack([np.broadcast_to(turns[:, :1], (n, n - 2)), turns[:, 1:-1], turns[:, 2:]], -1)
+    a, b, c = np.moveaxis(corners[fans], 2, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=-1).sum(1) / 2
+    return float(areas.min()), fans[areas.argmin()]
 
 
 def _one_way(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:

@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -85,7 +86,7 @@ class StepPart:
     Attributes
     ----------
     names : tuple of str
-        Names of the F faces in the file, empty where it has none.
+        Names of the F faces in the file, empty where it has none or most have the same.
     surfaces : tuple of Surface or None
         What each face lies on; None where it is no plane, cylinder, cone, sphere or torus.
     edges : tuple of StepEdge
@@ -261,13 +262,26 @@ def part(record: dict[str, Any], unit: Unit = "mm") -> StepPart:
     faces, edges = record["faces"], record["edges"]
     corners = [scale * np.array(face["nodes"])[np.array(face["triangles"], int).reshape(-1, 3)] for face in faces]
     return StepPart(
-        names=tuple(face["name"] for face in faces),
+        names=_face_names([face["name"] for face in faces]),
         surfaces=tuple(_surface(face, scale) for face in faces),
         edges=tuple(_edge(edge, scale) for edge in edges),
         triangles=np.concatenate(corners),
         triangle_faces=np.repeat(np.arange(len(faces)), [len(c) for c in corners]),
         places=tuple(face.get("place", -1) for face in faces),
     )
+
+
+def _face_names(given: list[str]) -> tuple[str, ...]:
+    """What the file calls its faces, empty where most are called alike: by their body's name, or by none ('NONE').
+
+    Examples
+    --------
+    >>> _face_names(["PartBody", "PartBody", "PartBody", "datum plane"])
+    ('', '', '', 'datum plane')
+    """
+    common, count = Counter(given).most_common(1)[0]
+    is_name = count == 1 or 2 * count <= len(given)
+    return tuple(each if is_name or each != common else "" for each in given)
 
 
 def _surface(face: dict[str, Any], scale: float) -> Surface | None:

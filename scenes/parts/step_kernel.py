@@ -13,6 +13,7 @@ import io
 import json
 import math
 import os
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -45,7 +46,7 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
     if len(faces) > most_faces:
         raise Unusable(f"of at most {most_faces} faces, got {len(faces)}")
     if not faces:
-        raise Unusable("of a solid body, got none")
+        raise Unusable(_no_body(data, len(_parts([shape], "TopAbs_FACE", "Face"))))
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
     outcomes: list[bool] = []
@@ -55,7 +56,7 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
         solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
             found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted)
-        except Unusable as error:
+        except Exception as error:  # the kernel's own are of many types; another way may do
             found, broken = [], error
         outcomes.append(bool(found))
         if found and _is_closed(found):
@@ -65,6 +66,22 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
     faces, said = _faces(solid), _said(reader)
     found = [{**row, **said(face)} for row, face in zip(found, faces, strict=True)]
     return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces)}
+
+
+def _no_body(data: bytes, faces: int = 0) -> str:
+    """That a file has none, but so many faces, or which files it says its parts are in.
+
+    Examples
+    --------
+    >>> _no_body(b"#3=DOCUMENT_FILE('lid.stp','','',#4,'',$);")
+    "of a solid body, got none (it names other files: 'lid.stp')"
+    >>> _no_body(b"", 12)
+    'of a solid body, got none (faces that enclose no body: 12)'
+    """
+    files = [repr(name.decode("latin-1")) for name in re.findall(rb"DOCUMENT_FILE\s*\(\s*'([^']+)'", data)]
+    more = [f"it names other files: {', '.join(files[:_NAMED])}"] * bool(files)
+    more += [f"faces that enclose no body: {faces}"] * bool(faces)
+    return "of a solid body, got none" + (f" ({'; '.join(more)})" if more else "")
 
 
 def _faces(shape: Any) -> list[Any]:
@@ -150,7 +167,7 @@ def _read(data: bytes) -> tuple[Any, Any]:
     if int(reader.ReadStream("part.step", io.BytesIO(data))) != 1:  # done
         raise Unusable("a readable STEP file, got something else")
     if not reader.TransferRoots() or not reader.NbShapes():
-        raise Unusable("of a solid body, got none")
+        raise Unusable(_no_body(data))
     return reader, reader.OneShape()
 
 

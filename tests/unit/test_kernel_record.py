@@ -73,7 +73,7 @@ def kernel(monkeypatch):
     entity = lambda face, _: said.names.get(face.name)  # noqa: E731
 
     class Reader:
-        ReadStream = staticmethod(lambda name, data: said.status if data.read() == b"data" else 0)
+        ReadStream = staticmethod(lambda name, data: said.status if data.read().startswith(b"data") else 0)
         TransferRoots = staticmethod(lambda: said.roots)
         NbShapes = staticmethod(lambda: said.shapes)
         OneShape = staticmethod(lambda: said.whole)
@@ -215,6 +215,11 @@ def test_ways_to_a_closed_surface(kernel):
     found = step_kernel.record(b"data", 96, 2000)
     assert tried == [96, *coarser, 96]
     assert (len(found["faces"][0]["triangles"]), found["segments"]) == (4, 96)
+    tried.clear()
+    kernel.splined = lambda shape: {}["BSpline curve: Knots interval values too close"]
+    found = step_kernel.record(b"data", 96, 2000)  # a way at which the kernel breaks down is one that does not help
+    assert tried == [96, *coarser[:-1], 96]
+    assert (len(found["faces"][0]["triangles"]), found["segments"]) == (3, 96)
 
 
 def test_faces_that_cannot_be_cut_are_refused(kernel, monkeypatch):
@@ -266,9 +271,9 @@ def test_pieces_of_a_turn(kernel, faces, most, pieces):
     [
         ({"status": 0}, "a readable STEP file, got something else"),
         ({"roots": 0}, "of a solid body, got none"),
-        ({"shapes": 0}, "of a solid body, got none"),
-        ({"whole": body(plain("f"), solid=False)}, "of a solid body, got none"),
-        ({"whole": body()}, "of a solid body, got none"),
+        ({"shapes": 0}, "of a solid body, got none$"),
+        ({"whole": body(plain("f"), solid=False)}, r"got none \(faces that enclose no body: 1\)$"),
+        ({"whole": body()}, "of a solid body, got none$"),
         ({"whole": body(*map(plain, "fgh"))}, "of at most 2 faces, got 3"),
     ],
 )
@@ -278,6 +283,14 @@ def test_what_is_no_body_is_refused(kernel, change, match):
     kernel.__dict__.update(change)
     with pytest.raises(Unusable, match=match):
         step_kernel.record(b"data", 96, 2)
+
+
+def test_an_assembly_of_other_files_names_them(kernel):
+    """Whose parts a file refers to, and has no body of its own."""
+    kernel.roots = 0
+    others = b"data #3=DOCUMENT_FILE('lid.stp','','',#4,'',$) ;\n#7 = DOCUMENT_FILE ( 'box.stp','','',#8,'',$);"
+    with pytest.raises(Unusable, match=r"got none \(it names other files: 'lid.stp', 'box.stp'\)$"):
+        step_kernel.record(others, 96, 2)
 
 
 @pytest.mark.parametrize(

@@ -108,12 +108,57 @@ def test_an_open_edge_that_is_a_small_gap_is_closed():
     assert said == ("vertices of open edges joined: 4",)
     assert two_sided(found)
     far = trimesh.Trimesh(
-        np.concatenate([part.vertices, part.vertices + [1e-3, 0, 0]]),
+        np.concatenate([part.vertices, part.vertices + [1e-2, 1e-2, 1e-2]]),
         np.concatenate([part.faces[rest], part.faces[lid] + 8]),
         process=False,
     )
     with pytest.raises(InvalidInput, match="open edges: 8"):
         mended(far)
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_corners_on_an_edge_divide_its_triangle(times):
+    """A lid of smaller triangles than the walls below it: halves and quarters of its four edges."""
+    part = box()
+    lid = (part.triangles[:, :, 2] > 5.9).all(1)
+    fine = trimesh.Trimesh(part.vertices, part.faces[lid], process=False)
+    for _ in range(times):
+        fine = fine.subdivide()
+    joined = of(trimesh.Trimesh(part.vertices, part.faces[~lid], process=False), fine)
+    joined.vertices += [1e-7, 0, 0] * (np.arange(len(joined.vertices)) % 2)[:, None]  # digits of a file in text
+    found, said = mended(joined.copy())
+    joints = 4 * (2**times - 1)
+    assert said[-1] == f"corners on open edges, whose triangles were divided there: {joints}"
+    assert two_sided(found)
+    assert found.volume == pytest.approx(72.0, abs=1e-5)
+    solid = mesh.solid(joined)
+    assert (len(solid.faces), len(solid.sharp), len(solid.corner_names)) == (6, 12, 8)
+    assert not (np.diff(found.triangles[:, [0, 1, 2, 0]], axis=1) == 0).all(-1).any()
+
+
+def lifted(height):
+    """A box whose lid's two triangles beside one edge meet in a corner ``height`` outside of it."""
+    part = box()
+    lid = np.flatnonzero((part.triangles[:, :, 2] > 5.9).all(1))
+    side = next(k for k in lid if np.ptp(part.triangles[k], axis=0)[1] > 3.9)
+    corners = part.faces[side]
+    k = next(k for k in range(3) if abs(np.diff(part.vertices[corners[[k, k - 2]]], axis=0)[0, 0]) < 1e-9)
+    start, stop, apex = corners[k], corners[k - 2], corners[k - 1]
+    out = np.sign(part.vertices[start][0] - 1.5) * np.array([height, 0, 0])
+    faces = [*np.delete(part.faces, side, 0).tolist(), [start, 8, apex], [8, stop, apex]]
+    middle = part.vertices[[start, stop]].mean(0) + out
+    return trimesh.Trimesh(np.vstack([part.vertices, middle]), faces, process=False)
+
+
+def test_a_slit_is_filled():
+    """Three edges between which 0.001 of 6 mm is open; what is 0.1 wide is no slit, and refused."""
+    found, said = mended(lifted(1e-3))
+    assert said == ("slits filled, 0.0005 wide at most: 1",)
+    assert two_sided(found)
+    assert found.volume == pytest.approx(72.0, abs=2e-3)
+    assert found.area == pytest.approx(2 * (3 * 4 + 3 * 6 + 4 * 6) + 2 * 0.002, rel=1e-9)
+    with pytest.raises(InvalidInput, match=r"open edges: 3, at"):
+        mended(lifted(0.1))
 
 
 def test_triangles_that_look_the_other_way_are_turned():

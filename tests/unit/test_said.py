@@ -345,3 +345,15 @@ def test_what_takes_long_in_a_plan_says_at_once_that_it_works(monkeypatch, task1
     found = SimpleNamespace(scene=task1)
     assert (plan._check(found, 3, asked=False), plan._check_varied(found)) == ("checked", "varied")
     assert said == [("steps", True), ("settings", True), ("plans", True)]
+
+
+@pytest.mark.parametrize("name", ["py.warnings", "trimesh"])
+def test_what_libraries_log_is_no_line(name, monkeypatch, capsys):
+    """A PLY file that names a texture had its reader's traceback on standard error, and was read."""
+    log = logging.getLogger(name)
+    for owner, key, value in ((log, "handlers", []), (log, "propagate", True), (logging.root, "handlers", [])):
+        monkeypatch.setattr(owner, key, value)
+    monkeypatch.setattr(logging, "captureWarnings", lambda _: None)
+    verbosity.hush()
+    log.warning("unable to load image!")
+    assert capsys.readouterr().err == ""

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import scenes
+from imaging.light import exchange as exchange_module
 from imaging.light import senders as senders_module
 from imaging.light.emitters import emitters, plain
-from imaging.light.exchange import exchange_of, room
+from imaging.light.exchange import Exchanged, exchange_of, room
 from imaging.light.senders import senders
 from imaging.pictures import Pictures
 from scenes import Picture
@@ -83,3 +84,15 @@ def test_what_a_gap_sends_on_is_as_paths_tell(picture, monkeypatch):
     assert told < 0.065  # margin: twice what is measured, 3.1 %, of which 1.4 % are the paths' own
     assert coarse > 0.065  # 8.2 %
     assert mean == pytest.approx(1, abs=0.03)  # margin: twice what is measured
+
+
+def test_places_are_asked_in_blocks(picture, monkeypatch):
+    """Of so many rays at most, which bounds the memory; what they send is the same to the last digit."""
+    whole, asked = senders(picture).sent, []
+    monkeypatch.setattr(exchange_module, "_AT_ONCE", 100 * exchange_module._FROM_PIECE)
+    gathered = Exchanged.gathered
+    counted = lambda self, met, count, rays: asked.append(count) or gathered(self, met, count, rays)  # noqa: E731
+    monkeypatch.setattr(Exchanged, "gathered", counted)
+    parts = senders.__wrapped__(picture).sent
+    assert max(asked) == 100 < sum(asked)
+    np.testing.assert_array_equal(parts, whole)

@@ -58,6 +58,17 @@ def test_record_of_a_flange():
     check_flange(step.part(record, "inch"), 1 / 25.4, 24)
 
 
+def test_what_most_faces_are_called_is_no_name():
+    """Some programs call each face "NONE", others by its body's name; what a face alone is called stays."""
+    record = json.loads(RECORD.read_text())
+    for face in record["faces"]:
+        face["name"] = face["name"] if face["name"] == "top" else "NONE"
+    part = step.part(record)
+    assert "top" in part.solid.face_names
+    assert not [name for name in part.solid.face_names if name.startswith("NONE")]
+    assert [wall.name for wall in part.curved] == ["k1"]
+
+
 def test_another_format_is_refused():
     with pytest.raises(InvalidInput, match="must be a record of format 2, got 1"):
         step.part({"format": 1})

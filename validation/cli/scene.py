@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 import scenes
 from scenes.results import picked
 from scenes.status import legend
+from scenes.view import units_meant
 from validation.cli.common import Json, SceneName, commands, parse_pose, progress, say
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
@@ -54,14 +56,17 @@ def new_command(
         raise scenes.InvalidInput(f"--output must be a new file, got {path}, which exists")
     with progress(f"{part}", "steps", at_once=True) as shown:
         from validation.new_scene import written  # the planner takes a second to load
+        from validation.report.scene_table import sides
 
         which = int(body) if body and body.isdecimal() else body
         new = written(part, path, units, shown, which, general and general.removeprefix("ISO2768-"))
     made, look = new.scene, new.look
     asked = [] if look is None else look.facts
+    size = np.ptp(made.solid.vertices, axis=0)
     facts = {
         "file": str(path),
         "scene": str(path),
+        "size": size.tolist(),
         "features": {"edges": len(made.solid.sharp), "circles": len(made.solid.rims)},
         "edges": len(made.solid.sharp),
         "circles": len(made.solid.rims),
@@ -74,7 +79,8 @@ def new_command(
     text = "\n".join(
         [
             *(f"Mended: {each}" for each in made.solid.mended),
-            f"{path}: {facts['edges']} edges, {facts['circles']} circles",
+            f"{path}: {sides(size)} {made.units}, {facts['edges']} edges, {facts['circles']} circles",
+            *_unit_hint(made),
             *_characteristics(new.characteristics),
             *(["What could be measured, as seen from the setting that is proposed:"] if asked else []),
             *(f"  {each['name']}: {each['status']}" for each in asked),
@@ -84,6 +90,12 @@ def new_command(
         ]
     )
     say(facts, as_json, text)
+
+
+def _unit_hint(made: scenes.Scene) -> list[str]:
+    """That the numbers of a file that says no unit are likely in another one."""
+    meant = " or ".join(units_meant(made.solid, made.units)) if getattr(made.object, "units", None) else ""
+    return [f"Its numbers were taken for {made.units}, and it is small for that: --units {meant} perhaps"] * bool(meant)
 
 
 def _characteristics(rows: list[dict[str, Any]]) -> list[str]:

@@ -29,11 +29,12 @@ def choose(quiet: bool, verbose: bool) -> None:
 
 
 def hush() -> None:
-    """Warnings of libraries are no lines of their own; -v shows them."""
+    """Warnings of libraries, and what a reader of meshes logs, are no lines of their own; -v shows them."""
     logging.captureWarnings(True)
-    warned = logging.getLogger("py.warnings")
-    warned.propagate = False
-    warned.addHandler(logging.StreamHandler() if _verbose else logging.NullHandler())
+    for name in ("py.warnings", "trimesh"):
+        told = logging.getLogger(name)
+        told.propagate = False
+        told.addHandler(logging.StreamHandler() if _verbose else logging.NullHandler())
 
 
 def quiet() -> bool:

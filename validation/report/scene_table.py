@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -71,11 +71,18 @@ def _cylinder(each: Recognised) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def sides(lengths: Iterable[float]) -> str:
+    """
+    >>> sides((60, 40, 12.00004))
+    '60 x 40 x 12'
+    """
+    return " x ".join(f"{x:.4g}" for x in lengths)
+
+
 def report(scene: Scene) -> Group:
     """The same as tables."""
     unit, camera = scene.units, scene.camera
-    size = " x ".join(f"{x:.4g}" for x in np.ptp(scene.solid.vertices, axis=0))
-    view = " x ".join(f"{x:.4g}" for x in camera.field_of_view)
+    size, view = sides(np.ptp(scene.solid.vertices, axis=0)), sides(camera.field_of_view)
     parts = [
         Text(
             f"{scene.title or scene.name}\n"
