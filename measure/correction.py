@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 
 import numpy as np
 
@@ -91,7 +92,7 @@ def correction(
         raise InvalidInput("renders must be at least one noise-free image, got none")
     if not picture.lights:
         raise InvalidInput("light must be a pose to correct the bias, got nothing")
-    clean = np.mean(images.renders, axis=0)  # noise of rays makes weak edges steeper where they cross zero, sigma less
+    clean = mean_of(images.renders)  # noise of rays makes weak edges steeper where they cross zero, sigma less
     told = propagated or propagate(clean, picture, estimator=estimator, threshold=threshold).measurands
     steps = [(name, image) for name, some in images.changed.items() for image in some]
     levels = _levels((*images.renders, *images.beside, *(image for _, image in steps), clean), picture)
@@ -168,11 +169,19 @@ def _adjusted(images: Images, picture: Picture, names: tuple[str, ...], moved: l
     return None if found is None else Adjusted(found, names, *moved)
 
 
+def mean_of(renders: Sequence[np.ndarray]) -> np.ndarray:
+    """Mean of images, without a copy of all of them."""
+    return reduce(np.add, renders) / len(renders)
+
+
 def _levels(images: Sequence[np.ndarray], picture: Picture) -> np.ndarray:
     """What the sensor records of noise-free images, (n, height, width)."""
     camera = picture.scene.camera
     size = camera.height, camera.width
-    return np.stack([seen(picture.scene.noise, checked_image(image, size)).level for image in images])
+    levels = np.empty((len(images), *size))
+    for level, image in zip(levels, images, strict=True):
+        level[:] = seen(picture.scene.noise, checked_image(image, size)).level
+    return levels
 
 
 def _measured(

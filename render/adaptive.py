@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import cv2
@@ -42,14 +43,14 @@ def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP, where: np.ndar
 
 
 def _span(fine: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Largest less smallest of each marked pixel and its eight neighbours."""
-    wide = np.pad(fine, 1, mode="edge")
-    rows, columns = np.nonzero(where)
-    width, flat = wide.shape[1], wide.ravel()
-    at = (rows + 1) * width + columns + 1
-    low = high = flat[at]
-    for off in (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1):
-        beside = flat[at + off]
+    """Largest less smallest of each marked pixel and its eight neighbours, of a border's as many as there are."""
+    places = np.nonzero(where)
+    low = high = fine[places]
+    rows, columns = (
+        [np.clip(at + off, 0, size - 1) for off in (-1, 0, 1)] for at, size in zip(places, fine.shape, strict=True)
+    )
+    for row, column in itertools.product(rows, columns):
+        beside = fine[row, column]
         low, high = np.minimum(low, beside), np.maximum(high, beside)
     return high - low
 

@@ -236,6 +236,8 @@ class _Tracer:
             seen["sampler"] = {"type": "stratified", "jitter": False}
         sight = Sight.of(self.picture, active, self.quality.supersample // divided)
         gathering = self.gathering if "interreflection" in active else None
+        if gathering is not None:
+            seen["film"] |= {"pixel_format": "rgb"}
         return Tiles(self.mitsuba, loaded, seen, (crop[0].start, crop[1].start), sight, gathering=gathering)
 
     def whole(self, random: bool, count: int, where: np.ndarray | None = None) -> np.ndarray:

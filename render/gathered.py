@@ -32,14 +32,14 @@ class Gathering:
     ----------
     mitsuba : module
     scene : mitsuba.Scene
-    met, seen : mitsuba.Integrator
-        Of what rays from a surface meet with what is seen, and of what is seen alone.
+        Its surfaces are red: what they reflect is, what shines itself is white.
+    met : mitsuba.Integrator
+        Of what is seen and what rays from there meet.
     """
 
     mitsuba: Any
     scene: Any
     met: Any
-    seen: Any
 
     @classmethod
     def of(cls, mitsuba: Any, picture: Picture) -> Gathering | None:
@@ -54,18 +54,14 @@ class Gathering:
         made: dict[str, Any] = {"type": "scene"}
         for kind in np.unique(kinds):
             here = kinds[found.faces] == kind
-            bsdf = {"type": "diffuse", "reflectance": {"type": "spectrum", "value": white[kind]}}
+            bsdf = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [white[kind], 0.0, 0.0]}}
             made[f"kind{kind}"] = mesh(
                 mitsuba, found.triangles[here], bsdf, normals=found.normals[here], sent=found.sent[here]
             )
-        met = {"type": "direct", "emitter_samples": 0, "bsdf_samples": 1}
-        integrators = (mitsuba.load_dict(each) for each in (met, {"type": "path", "max_depth": 1}))
-        return cls(mitsuba, mitsuba.load_dict(made, parallel=False), *integrators)
+        met = mitsuba.load_dict({"type": "direct", "emitter_samples": 0, "bsdf_samples": 1})
+        return cls(mitsuba, mitsuba.load_dict(made, parallel=False), met)
 
     def image(self, sensor: Any, seed: int) -> np.ndarray:
-        """What a sensor sees of it, the same rays twice."""
-        met, seen = (
-            np.array(self.mitsuba.render(self.scene, sensor=sensor, integrator=way, seed=seed), float)[:, :, 0]
-            for way in (self.met, self.seen)
-        )
-        return met - seen
+        """What a sensor, whose film has colours, sees of it: of what shines itself both colours have the same."""
+        seen = np.array(self.mitsuba.render(self.scene, sensor=sensor, integrator=self.met, seed=seed), float)
+        return seen[:, :, 0] - seen[:, :, 1]

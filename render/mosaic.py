@@ -21,6 +21,8 @@ _SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels: each twice the one before
 _SENSOR = {"perspective": 20, "orthographic": 20, "thinlens": 200}  # rays that take as long as making a sensor
 Placed: TypeAlias = Callable[[int, int], list[Any]]  # a tile's row and column to transforms of sensors that look at it
 
+_LUMINANCE = 0.212671, 0.715160, 0.072169  # of red, green and blue, as films of one colour have it
+
 _AT_ONCE = 1024  # fine pixels along a film: single precision knows places on it to 1e-4 of one
 
 
@@ -42,7 +44,7 @@ class Tiles:
     roughly : bool
         Whether its tiles may be large.
     gathering : Gathering, optional
-        What adds to the image.
+        What adds to the image; the film of ``view`` has colours then.
     """
 
     mitsuba: Any
@@ -87,20 +89,31 @@ class Tiles:
             placed = () if self.sight is None else (self._placed(self.sight, pupils, side),)
             places = [(y + top, x + left) for y, x in part]
             sensor = _side_by_side(self.mitsuba, view, places, side, samples // len(pupils), *placed)
-            strip = np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=number), float)[:, :, 0]
+            strip = _luminance(np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=number), float))
             if self.gathering is not None:
                 strip += self.gathering.image(sensor, number)
-            strip = strip.reshape(side, len(part), len(pupils), side).mean(2).reshape(side, -1)
-            for i, (y, x) in enumerate(part):
-                above, before = max(-y, 0), max(-x, 0)  # of the tile, outside the image
-                here = fine[y + above : y + side, x + before : x + side]
-                here[:] = strip[above : above + here.shape[0], i * side + before : i * side + before + here.shape[1]]
+            strip = strip.reshape(side, len(part), len(pupils), side).mean(2)
+            _put(fine, strip.swapaxes(0, 1), np.array(part))
         return fine
 
     def _placed(self, sight: Sight, pupils: np.ndarray, side: int) -> Placed:
         """Where each tile's sensors stand of a telecentric camera: one for each place on the aperture."""
         make = self.mitsuba.ScalarTransform4f
         return lambda y, x: [make(sight.to_world((x, y), (side, side), pupil)) for pupil in pupils]
+
+
+def _luminance(film: np.ndarray) -> np.ndarray:
+    """Image (height, width) of a film (height, width, 1 or 3)."""
+    return film[:, :, 0] if film.shape[2] == 1 else film @ _LUMINANCE
+
+
+def _put(fine: np.ndarray, tiles: np.ndarray, corners: np.ndarray) -> None:
+    """Tiles (n, side, side) into the image, at corners (row, column) there (n, 2); what lies beside it is left out."""
+    along = np.arange(tiles.shape[1])
+    rows, columns = corners[:, :1] + along, corners[:, 1:] + along
+    rows, columns = np.broadcast_arrays(rows[:, :, None], columns[:, None, :])
+    inside = (rows >= 0) & (rows < fine.shape[0]) & (columns >= 0) & (columns < fine.shape[1])
+    fine[rows[inside], columns[inside]] = tiles[inside]
 
 
 def _held(marked: np.ndarray, side: int) -> np.ndarray:

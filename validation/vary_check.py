@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import fdtr, fdtrc, fdtri
 
 import planner
 import render
@@ -157,8 +157,8 @@ def judged(fixed: Scatter, best: Scatter, *, same: bool = False) -> VaryCheck:
         return VaryCheck(fixed, best, float("nan"), predicted, (0.0, float("inf")), float("nan"), text)
     gain = fixed.measured * fixed.share / (best.measured * best.share)
     freedoms = [row.n - row.failed - 1 for row in (fixed, best)]
-    ends = tuple(float(gain / stats.f.ppf(p, *freedoms)) for p in (0.975, 0.025))
-    p_value = float(min(1.0, 2 * min(law(gain / predicted, *freedoms) for law in (stats.f.cdf, stats.f.sf))))
+    ends = tuple(float(gain / fdtri(*freedoms, p)) for p in (0.975, 0.025))
+    p_value = float(min(1.0, 2 * min(law(*freedoms, gain / predicted) for law in (fdtr, fdtrc))))
     doubtful = [row.status for row in (fixed, best) if not status.is_trusted(row.status)]
     if p_value < LEVEL:
         said = "contradict: the measured gain is not the predicted one"

@@ -8,7 +8,8 @@ import pytest
 import render
 import scenes
 from render import Quality, fine, variant
-from render.gathered import is_gathered
+from render.build import view
+from render.gathered import Gathering, is_gathered
 from scenes import Picture
 
 pytestmark = [
@@ -42,6 +43,18 @@ def test_gathered_light_is_that_of_paths(picture, monkeypatch):
     assert abs(apart(whole, gathered)) < 4
     monkeypatch.setattr(fine.Gathering, "image", lambda *given: 0.0)
     assert apart(whole, rendered(picture, replace(_FEW, gathered=True))) < -20  # margin: five times; 98
+
+
+def test_what_shines_itself_is_taken_off_ray_by_ray(picture):
+    """Gathered light is nowhere negative, nor where an edge of a face that shines is seen: other rays would see other
+    parts of it."""
+    mitsuba, camera = variant.use(variant.choose()), picture.scene.camera
+    crop = slice(0, camera.height), slice(0, camera.width)
+    seen = view(mitsuba, picture, frozenset({"interreflection"}), (camera.width, camera.height), crop, 16)
+    seen["film"] |= {"pixel_format": "rgb"}
+    found = Gathering.of(mitsuba, picture).image(mitsuba.load_dict(seen), 0)
+    assert found.min() >= 0
+    assert found.max() > 1
 
 
 @pytest.mark.parametrize(("name", "does"), [("grey_floor", True), ("copper", False), ("shaft", False)])

@@ -17,6 +17,7 @@ import numpy as np
 import measure
 import render
 from measure import Correction, Images
+from measure.correction import mean_of
 from measure.known_bias import RENDERING, TEXTURE
 from measure.propagation import PropagatedValues
 from measure.unevenness import Unevenness
@@ -108,7 +109,7 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
     """
 
     def propagated(renders: tuple[np.ndarray, ...]) -> PropagatedValues:
-        clean = np.mean(renders, axis=0)
+        clean = mean_of(renders)
         return measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
 
     images = None

@@ -127,10 +127,17 @@ def _both_ways(
     ways = [each for pair in _pairs(others, picture, times) for each in pair]
     seen = iter(_steps(first, made, ways, picture))
     return tuple(
-        first + part / (2 * times)
+        _added(first, part, 2 * times)
         for one, other in zip(seen, seen, strict=True)
         for part in (one - other, one + other - 2 * first)
     )
+
+
+def _added(first: np.ndarray, part: np.ndarray, over: float) -> np.ndarray:
+    """The first render and a difference over a number, in the memory of the latter."""
+    part /= over
+    part += first
+    return part
 
 
 def _steps(
@@ -142,14 +149,21 @@ def _steps(
     """The first render with what other pictures differ by from this one, both of the same random numbers."""
     changed, dark = [made(other) for other in others], picture.scene.noise.dark_level
     here = made(picture) if changed else first
-    return tuple(_changed(first - dark, here - dark, other - dark) + dark for other in changed)
+    return tuple(_changed(first, here, other, dark) for other in changed)
 
 
-def _changed(first: np.ndarray, here: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """An image as another one differs from this one, ``here``, both of few rays; grey levels above darkness.
+def _changed(first: np.ndarray, here: np.ndarray, other: np.ndarray, dark: float = 0.0) -> np.ndarray:
+    """An image as another one differs from this one, ``here``, both of few rays; grey levels.
 
     Of the same picture with many rays, ``first``. Edges lie a little elsewhere in an image of few rays: what it says
-    of all levels together is taken of the other image itself, or a light that is farther away would move them.
+    of all levels together is taken of the other image itself, or a light that is farther away would move them. Most of
+    a large image is dark where nothing is measured, and so are both: only the rest of them is read.
     """
-    part = float((other * here).sum()) / max(float((here * here).sum()), np.finfo(float).tiny)
-    return part * first + (other - part * here)
+    lit = np.flatnonzero((here != dark) | (other != dark))
+    before, after = (image.ravel()[lit] - dark for image in (here, other))
+    part = float(after @ before) / max(float(before @ before), np.finfo(float).tiny)
+    changed = first - dark
+    changed *= part
+    changed += dark
+    changed.ravel()[lit] += after - part * before
+    return changed
