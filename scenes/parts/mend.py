@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
 
@@ -17,6 +18,7 @@ from scenes.parts.rows import different
 _GAP = 1e-5  # of the part's size: open edges that lie closer are one
 _SLIT = 3e-4  # of the part's size: what is open and narrower is filled
 _MOST_AROUND = 64  # corners of a slit
+_MOST_OPEN = 10_000  # edges: more are no seams between triangles that were meant to meet
 _SAME = 1e-5  # rad, between triangles of one plane
 _SAID = 3  # places of open edges
 
@@ -102,7 +104,7 @@ def _divided(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     halves = np.sort(_halves(mesh.faces), 1)
     edges, which = different(halves)
     alone = np.flatnonzero(np.bincount(which) % 2)
-    if not alone.size:
+    if not 0 < alone.size <= _MOST_OPEN:
         return mesh, []
     faces, sources, count = mesh.faces.tolist(), list(range(len(mesh.faces))), 0
     pieces = {i: [i] for i in range(len(faces))}
@@ -137,6 +139,8 @@ def _filled(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     halves = _halves(mesh.faces)
     _, which = different(np.sort(halves, 1))
     alone = np.flatnonzero(np.bincount(which)[which] == 1)
+    if not 0 < alone.size <= _MOST_OPEN:
+        return mesh, []
     beside = {tuple(half): int(k) % len(mesh.faces) for half, k in zip(halves[alone].tolist(), alone, strict=True)}
     added, sources, widths = [mesh.faces], list(range(len(mesh.faces))), []
     for loop in _loops(list(beside)):
@@ -157,17 +161,14 @@ def _filled(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
 
 def _loops(halves: list[tuple[int, int]]) -> Iterator[list[int]]:
     """Closed ways around what is open, against the edges of the triangles beside it; no long ones."""
-    onward: dict[int, list[int]] = {}
+    onward: dict[int, list[int]] = defaultdict(list)
     for start, stop in halves:
-        onward.setdefault(stop, []).append(start)
-    while onward:
-        way = [next(iter(onward))]
-        while way[-1] in onward and (len(way) == 1 or way[-1] != way[0]):
-            there = onward[way[-1]]
-            if len(there) == 1:
-                del onward[way[-1]]
-            way.append(there.pop())
-        if way[-1] == way[0] and len(way) <= _MOST_AROUND:
+        onward[stop].append(start)
+    for _, first in halves:
+        way = [first]
+        while onward[way[-1]] and (len(way) == 1 or way[-1] != first):
+            way.append(onward[way[-1]].pop())
+        if 1 < len(way) <= _MOST_AROUND and way[-1] == first:
             yield way[:-1]
 
 
