@@ -11,7 +11,7 @@ validate: $(VENV)/.installed
 test: lint
 	$(BIN)/pytest -n 2 --dist worksteal -m "not long"
 
-# Those of tests/long.txt as well (2 minutes more).
+# Those of tests/long.txt as well (ten minutes more).
 test-all: lint
 	$(BIN)/pytest -n 2 --dist worksteal
 
