@@ -307,9 +307,7 @@ def bundles(
                 found = of_part(scene, draws, sets, seed)
                 rows, wrong, passed = rows + found[0], wrong + found[1], passed + found[2]
     if only in ("", "board"):
-        found, unseen = of_board(
-            3 * sets, seed
-        )  # of four rows alone fewer would not show a variance 1.3 times too large
+        found, unseen = of_board(3 * sets, seed)  # of four rows fewer do not show a variance 1.3 times too large
         rows, passed = rows + found, passed + unseen
     if only in ("", "station"):
         told = of_station(draws, seed, smaller)
