@@ -78,13 +78,15 @@ def test_what_cannot_be_is_told_in_a_line(roof, changes, says):
         _with(roof, **changes)
 
 
-def test_other_lenses_and_several_pictures_are_refused(beside, roof):
+def test_other_lenses_are_refused_and_several_pictures_share_what_is_estimated(beside, roof):
     none = ((0.0,) * 5,) * 5
     splined = Splined(kind="splined", extent=(-0.3, -0.3, 0.3, 0.3), right=none, down=none)
     with pytest.raises(InvalidInput, match=r"placement\.camera must be without k1 of a splined lens"):
         _with(beside, camera={"lens": splined.model_dump()})
-    with pytest.raises(InvalidInput, match=r"placement\.camera must be left out of several pictures"):
-        planner.predict_bundle([roof, roof])
+    pair = [roof, Picture.of(roof.scene, (25.0, 200.0), tuple(roof.lights[0]))]
+    told = planner.predict_bundle(pair, close=False)
+    assert "estimated" in told.known_before
+    assert {"estimated 1", "estimated 2"} <= set(planner.predict_bundle(pair, cameras="each", close=False).known_before)
 
 
 def test_points_move_as_opencv_says(beside):

@@ -101,8 +101,6 @@ def test_a_sensor_that_is_held_keeps_its_place_and_gets_the_best_lights(scene, s
 
 
 def test_what_cannot_be_planned(scene):
-    with pytest.raises(InvalidInput, match="lights must be one that is free, for several pictures, got 2"):
-        planner.plan_views(scene, 2)
     with pytest.raises(InvalidInput, match=r"light must be 2 pose\(s\), one for each free light, got 1"):
         planner.plan(scene, light=(10, 10), sensor=(40, 280))
     with pytest.raises(InvalidInput, match="shares must be one of best, given"):
