@@ -6,8 +6,9 @@ import re
 import pytest
 
 import planner
+import scenes
 from tests.sides import sides
-from validation.report import views_page
+from validation.report import cells, views_page
 
 
 @pytest.fixture(scope="module")
@@ -39,3 +40,10 @@ def test_the_page_shows_each_picture_and_where_it_is_taken(around, tmp_path):
         assert each.name in written
     identifiers = re.findall(r'id="([^"]*)"', written)
     assert len(set(identifiers)) == len(identifiers)
+
+
+def test_each_lamp_of_two_lights_is_shown():
+    found = planner.plan_views(scenes.load("two_lights"), 1, step_deg=60, refined=False)
+    (view,) = found.sets[0].views
+    drawn = str(views_page.sky(found.sets[0]))
+    assert f"lamp {cells.pose(view.light[0])} {cells.pose(view.light[1])}" in drawn

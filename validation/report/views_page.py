@@ -10,7 +10,7 @@ from markupsafe import Markup
 from scipy.stats import norm
 
 import planner
-from scenes import Picture
+from scenes import Picture, several
 from scenes.results import finite
 from validation.report import camera_words, cells, map_figure, page, station_table, station_view
 from validation.report.canvas import TEXT, WIDTH, inline, plt
@@ -74,14 +74,16 @@ def requirements(found: planner.ViewSet) -> tuple[Requirement, ...]:
 
 def sky(found: planner.ViewSet, key: str = "sky") -> Markup:
     """Where cameras and lamps stand, numbered, seen from above the part."""
-    poses = [pose for view in found.views for pose in (view.sensor, view.light)]
+    poses = [pose for view in found.views for pose in (view.sensor, *several(view.light))]
     reach = 90.0 if max(pose.polar_deg for pose in poses) <= 90 else 180.0
     figure, axis = plt.subplots(figsize=(WIDTH, 0.9 * WIDTH), layout="constrained")
     map_figure.rings(axis, reach)
     for number, view in enumerate(found.views, 1):
-        ends = [map_figure.place(*pose) for pose in (view.sensor, view.light)]
-        axis.plot(*zip(*ends, strict=True), color="0.4", lw=0.9, ls=(0, (4, 3)))
-        for (x, y), marker, colour in zip(ends, "so", (_CAMERA, _LAMP), strict=True):
+        camera, *lamps = [map_figure.place(*pose) for pose in (view.sensor, *several(view.light))]
+        for lamp in lamps:
+            axis.plot(*zip(camera, lamp, strict=True), color="0.4", lw=0.9, ls=(0, (4, 3)))
+        marks = [(camera, "s", _CAMERA), *((lamp, "o", _LAMP) for lamp in lamps)]
+        for (x, y), marker, colour in marks:
             axis.plot(x, y, marker, color=colour, ms=15, mec="white")
             axis.text(x, y, str(number), color="white", fontsize=TEXT, ha="center", va="center_baseline", weight="bold")
     return inline(figure, key, f"Seen from above: squares cameras, circles lamps. {_told(found)}.")
