@@ -122,6 +122,11 @@ class Board(Model):
         return self.at(numbered(*self.shape))
 
     @property
+    def by_pitch(self) -> np.ndarray:
+        """Derivative of its points by its pitch, shape (n, 3): the first one stays."""
+        return (self.points - np.array(self.corner)) / self.pitch
+
+    @property
     def outer(self) -> np.ndarray:
         """Places of its own corners, counterclockwise, (4, 2): a bright border a pitch wide beyond squares or dots."""
         x, y = self.shape

@@ -56,8 +56,8 @@ def inspect(
 
     Notes
     -----
-    Simulated are the pictures as they are said to be; those of sensors of which nothing is known, or of
-    a part whose place is left to the pictures, as they are found.
+    Simulated are the pictures as they are said to be; those of sensors of which nothing is known, or of a part whose
+    place is left to the pictures, as they are found.
     """
     found = measure.bundle(shots, sensors, estimator=estimator)
     is_lit = all(picture.lights for _, picture in shots)

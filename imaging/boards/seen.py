@@ -108,8 +108,7 @@ def seen_board(pictures: Pictures, seen: Seen) -> SeenBoard | None:
         return None
     by_place = seen.slopes(board.points)  # (..., n, 2, 3)
     moved = points_by_deviations(board.points, pictures.sensors, pictures.scene)
-    away = board.points - np.array(board.corner)
-    by_pitch = np.einsum("...nij,nj->...ni", by_place, away / board.pitch)[..., None] * pitch_u(pictures.scene)
+    by_pitch = np.einsum("...nij,nj->...ni", by_place, board.by_pitch)[..., None] * pitch_u(pictures.scene)
     beside = np.concatenate([moved[..., :6] * of_board(said), by_pitch], -1)
     return SeenBoard(
         board=board,

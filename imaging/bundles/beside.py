@@ -14,7 +14,7 @@ def points_at(unknowns: Unknowns, board: Board, numbers: np.ndarray) -> np.ndarr
     """Where a board's points (n, 3) are on the part with unknowns (n,) beside what the scene says."""
     place, (pitch,), printed = (unknowns.full(name, numbers) for name in (BOARD, BOARD_PITCH, BOARD_POINTS))
     pivot = np.array(unknowns.scene.camera.look_at)
-    there = board.points + pitch * _by_pitch(board) + printed.reshape(-1, 3)
+    there = board.points + pitch * board.by_pitch + printed.reshape(-1, 3)
     return (there - pivot) @ turn(np.degrees(place[3:])).T + pivot + place[:3]
 
 
@@ -22,10 +22,5 @@ def point_moves(unknowns: Unknowns, board: Board) -> np.ndarray:
     """Derivatives (n, 3, N) of its points by the N unknowns, with the part's own motion."""
     place = unknowns.basis("part") + unknowns.basis(BOARD)
     moved = steps(board.points, np.array(unknowns.scene.camera.look_at)) @ place
-    moved += _by_pitch(board)[..., None] * unknowns.basis(BOARD_PITCH)
+    moved += board.by_pitch[..., None] * unknowns.basis(BOARD_PITCH)
     return moved + unknowns.basis(BOARD_POINTS).reshape(-1, 3, unknowns.count)
-
-
-def _by_pitch(board: Board) -> np.ndarray:
-    """Derivative of its points by its pitch, (n, 3)."""
-    return (board.points - np.array(board.corner)) / board.pitch

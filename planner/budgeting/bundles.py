@@ -70,11 +70,10 @@ def bundle_budget(
     """The uncertainty of every measurand of pictures adjusted together; one budget a measurand.
 
     Rows of what the adjustment knows before are ``part``, ``sensor 1``, ..., ``carrier`` (errors of hand_eye, stage and
-    turntable that pictures share), ``carrier 1``, ... (each picture's own), ``camera``,
-    ``estimated`` (``placement.camera``), ``board``, ``board pitch``,
-    ``board points`` and ``datums``; a sensor that
-    counts as known has those of its pose, with its number. Where biases are taken off, what that is not sure of
-    (``bias by ...``) stands in place of the model error.
+    turntable that pictures share), ``carrier 1``, ... (each picture's own), ``camera``, ``estimated`` (what
+    ``placement.camera`` asks for), ``board``, ``board pitch``, ``board points`` and ``datums``; a sensor that counts as
+    known has those of its pose, with its number. Where biases are taken off, what that is not sure of (``bias by ...``)
+    stands in place of the model error.
 
     Parameters
     ----------

@@ -282,7 +282,8 @@ def settings_of(problem: SearchProblem, grid: Grid, report: Report) -> tuple[np.
     Settings (P, 2 + 2 F), and their information (P, M); 0 where not feasible.
     """
     scene, poses, told = problem.scene, [], []
-    for each in [problem, *(_of_one(problem, m) for m in range(len(scene.measurands)) if len(scene.measurands) > 1)]:
+    count = len(scene.quantities)
+    for each in (problem, *(_of_one(problem, m) for m in range(count if count > 1 else 0))):
         lights = best_lights(each, grid, "given", report).lights
         allowed = problem.constraints.allowed(scene, grid.sensors, lights)
         variances = problem.errors(grid.sensors, lights).variances_object
