@@ -18,7 +18,7 @@ from measure.covariances import of_measured, scaled
 from measure.goodness import WORST
 from measure.known_bias import Correction
 from measure.measurement import check_same, checked_image
-from measure.placement import locate
+from measure.placement import Located, locate
 from measure.quantities import MeasuredFeatures, find
 from measure.saturation import saturated
 from scenes import InvalidInput, Picture, Quantity, status
@@ -65,6 +65,9 @@ class Bundled(Shown):
         What `u_bias` of the first set is made of, by source; None without corrections.
     pictures : tuple of Picture
         As the first set shows them: with part and sensors where they were found, to a few hundredths of a px.
+    placement, u_placement : ndarray, shape (..., 6 + c)
+        Where the part lies beside where the scene says, and what is estimated of the (first) camera, as of
+        `measure.Located`, with standard uncertainties (not variances); infinite where the pictures leave it open.
     places : ndarray, shape (..., P, 3)
         The vertices and centres of the part in space, turned and shifted to lie as the model's, the scene's unit.
     points : tuple of str
@@ -86,6 +89,8 @@ class Bundled(Shown):
     preferred: Preferred
     doubts: dict[str, np.ndarray] | None
     pictures: tuple[Picture, ...]
+    placement: np.ndarray
+    u_placement: np.ndarray
     places: np.ndarray
     points: tuple[str, ...]
 
@@ -176,10 +181,9 @@ def bundle(
     """
     freedom = Freedom(sensors, shape, axes, cameras)
     stacks, pictures, lead = _checked(shots)
-    expected = _begun(stacks, Bundle.of(pictures, freedom))
-    known = [
-        _Known.of_picture(*one, estimator) for one in zip(stacks, pictures, _each(corrections, pictures), strict=True)
-    ]
+    expected, where = _begun(stacks, Bundle.of(pictures, freedom))
+    each = zip(stacks, pictures, _each(corrections, pictures), where, strict=True)
+    known = [_Known.of_picture(*one, estimator) for one in each]
     for _ in range(_STEPS):
         found = [
             find(stack, there, *one.method) for stack, there, one in zip(stacks, expected.pictures, known, strict=True)
@@ -189,20 +193,26 @@ def bundle(
         if not np.isfinite(numbers).all() or expected.reach(numbers) < _SETTLED:
             break
         expected = expected.moved_by(numbers)
-    return _gathered(expected, every, lead)
+    return _gathered(expected, every, lead, [one.lost for one in known])
 
 
-def _begun(stacks: Sequence[np.ndarray], bundle: Bundle) -> Bundle:
-    """The same where images (n, height, width) show part and camera, as each alone has them; as the scene says of what
-    is not found, or where the part's place is not left to the pictures."""
+def _begun(stacks: Sequence[np.ndarray], bundle: Bundle) -> tuple[Bundle, list[Located | None]]:
+    """The same where images (n, height, width) show part and camera, as each alone has them; and of each picture of
+    which neither it nor, by where its sensor stands, another one tells where it is, why not.
+
+    As the scene says where the part's place is not left to the pictures.
+    """
     if not bundle.pictures[0].scene.placement.is_estimated:
-        return bundle
+        return bundle, [None] * len(stacks)
     each = [locate(stack.mean(0), picture) for stack, picture in zip(stacks, bundle.pictures, strict=True)]
+    is_free = [told == "unknown" for told in bundle.freedom.of_sensors(len(each))]
     there = {k: one.placement for k, one in enumerate(each, 1) if one.status == status.OK}
-    told = bundle.freedom.of_sensors(len(each))
-    held = [place for k, place in there.items() if told[k - 1] != "unknown"] or list(there.values())[:1]
-    free = {k: place for k, place in there.items() if told[k - 1] == "unknown"}
-    return bundle.placed_at(np.mean(held, 0), free) if held else bundle
+    tied = [place for k, place in there.items() if not is_free[k - 1]]
+    free = {k: place for k, place in there.items() if is_free[k - 1]}
+    told = [k in there or (bool(tied) and not is_free[k - 1]) for k in range(1, len(each) + 1)]
+    held = tied or list(there.values())[:1]
+    begun = bundle.placed_at(np.mean(held, 0), free) if held else bundle
+    return begun, [None if is_told else one for is_told, one in zip(told, each, strict=True)]
 
 
 def _each(corrections: Sequence[Correction] | None, pictures: list[Picture]) -> Sequence[Correction | None]:
@@ -226,28 +236,38 @@ class _Known:
         None where it is not known.
     of : ndarray of bool, shape (n,)
         Of which images it is: as many pixels at the end of the scale as it allows.
+    lost : Located or None
+        Why nothing tells where the part is in it; None where something does.
     """
 
     method: tuple[str, float | None]
     is_corrected: bool
     bias: FeatureBias | None
     of: np.ndarray
+    lost: Located | None
 
     @classmethod
     def of_picture(
-        cls, images: np.ndarray, picture: Picture, correction: Correction | None, estimator: str | None
+        cls,
+        images: np.ndarray,
+        picture: Picture,
+        correction: Correction | None,
+        lost: Located | None,
+        estimator: str | None,
     ) -> _Known:
         if correction is None:
-            return cls((estimator or best_estimator(picture), None), False, None, np.ones(len(images), bool))
+            return cls((estimator or best_estimator(picture), None), False, None, np.ones(len(images), bool), lost)
         check_same(correction, picture, estimator, None)
         told, name = correction.features, correction.estimator
         cut, (least, most) = saturated(images, picture, name), (0.0, np.inf) if told is None else told.saturated
-        return cls((name, correction.threshold), True, told, (cut >= least) & (cut <= most))
+        return cls((name, correction.threshold), True, told, (cut >= least) & (cut <= most), lost)
 
     def taken(self, found: MeasuredFeatures, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, FeatureBias | None]:
         """Of the i-th image how far off lines and circles are (q,), their covariance by noise (q, q), statuses
         (E + C,) and biases."""
         off, errors, states = found.offsets[i], _without_misfits(found, i), found.states(i)
+        if self.lost is not None:
+            return off, np.diag(np.full(len(off), np.inf)), np.full(len(states), self.lost.status), None
         if not self.is_corrected:
             return off, errors, states, None
         if self.bias is None or not self.of[i]:
@@ -289,13 +309,10 @@ class _One:
             *(one.taken(each, i) for one, each in zip(known, found, strict=True)), strict=True
         )
         chosen = Preferred.of(expected, errors, states, covariances(biases, errors))
-        numbers, squares = chosen.good.solved(off)
-        value, freedom = expected.values(numbers), chosen.good.told.freedom
-        if not chosen.by_good.all():
-            everything, more = chosen.every.solved(off)
-            value = np.where(chosen.by_good, value, expected.values(everything))
-            if not chosen.by_good.any():
-                numbers, squares, freedom = everything, more, chosen.every.told.freedom
+        numbers, squares = chosen.placed_by.solved(off)
+        value, freedom = expected.values(numbers), chosen.placed_by.told.freedom
+        if chosen.placed_by is chosen.good and not chosen.by_good.all():
+            value = np.where(chosen.by_good, value, expected.values(chosen.every.solved(off)[0]))
         p_value = float(chdtrc(freedom, squares)) if freedom > 0 else 1.0
         fits = status.OK if p_value >= WORST else status.MISFIT
         told = tuple(status.worst(each, fits) for each in chosen.statuses(states))
@@ -326,7 +343,7 @@ def _checked(shots: Sequence[tuple[np.ndarray, Picture]]) -> tuple[list[np.ndarr
     return stacks, pictures, leads[0]
 
 
-def _gathered(expected: Bundle, every: list[_One], lead: tuple[int, ...]) -> Bundled:
+def _gathered(expected: Bundle, every: list[_One], lead: tuple[int, ...], lost: list[Located | None]) -> Bundled:
     scene, count = expected.unknowns.scene, len(expected.quantities)
     own = [
         q.nominal if q.nominal is not None else v for q, v in zip(expected.quantities, expected.nominal[0], strict=True)
@@ -346,10 +363,20 @@ def _gathered(expected: Bundle, every: list[_One], lead: tuple[int, ...]) -> Bun
         bias=np.array([one.bias for one in every]).reshape(*lead, count),
         u_bias=np.array([one.u_bias for one in every]).reshape(*lead, count),
         p_value=np.array([one.p_value for one in every]).reshape(lead),
-        reason=every[0].chosen.reasons,
+        reason=tuple(_with_lost(reason, lost) for reason in every[0].chosen.reasons),
         preferred=every[0].chosen,
         doubts=every[0].doubts,
         pictures=expected.pictures,
+        placement=np.array([expected.placement_by(one.numbers) for one in every]).reshape(*lead, -1),
+        u_placement=np.array([one.chosen.placed_by.u_placement for one in every]).reshape(*lead, -1),
         places=np.array([expected.at(one.numbers).aligned().laid() for one in every]).reshape(*lead, -1, 3),
         points=(*(expected.unknowns.vertex(i) for i in expected.unknowns.vertices), *expected.unknowns.circles),
     )
+
+
+def _with_lost(reason: str, lost: list[Located | None]) -> str:
+    """Why a value is not told, with the pictures in which the part is not found; empty where it is told."""
+    if not reason:
+        return reason
+    where = (f"picture {k}: {one.reason}" for k, one in enumerate(lost, 1) if one is not None)
+    return "; ".join([*where, reason])

@@ -10,7 +10,7 @@ stays open.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -26,7 +26,7 @@ from imaging.features.measurand import measurands
 from imaging.features.placing import whitening
 from imaging.features.seen import Seen
 from imaging.pictures import Pictures
-from imaging.placed import difference, placed
+from imaging.placed import combined, difference, placed
 from scenes import InvalidInput, Picture, Quantity, Wall
 from scenes.measurands.form import forms_of
 from scenes.measurands.kinds import MEASURANDS
@@ -51,6 +51,11 @@ class Bundle:
         The same of a board beside the part.
     moved : ndarray, shape (n,)
         What of the unknowns the expected pictures have already, beside what the scene says.
+    before : ndarray, shape (n,)
+        The same as it is expected before a picture is seen (`scenes.Placement.expected`).
+    placement : ndarray, shape (6 + c,)
+        Of what they have already, where the part lies and what is estimated of the first camera, as of
+        `measure.Located`.
     """
 
     pictures: tuple[Picture, ...]
@@ -59,10 +64,12 @@ class Bundle:
     seen: tuple[Seen, ...]
     boards: tuple[SeenBoard | None, ...]
     moved: np.ndarray
+    before: np.ndarray
+    placement: np.ndarray
 
     @classmethod
-    def of(cls, pictures: Sequence[Picture], freedom: Freedom, moved: np.ndarray | None = None) -> Bundle:
-        """Of pictures of one part with the same measurands, which have some errors (n,) of the unknowns already.
+    def of(cls, pictures: Sequence[Picture], freedom: Freedom) -> Bundle:
+        """Of pictures of one part with the same measurands.
 
         Raises
         ------
@@ -71,35 +78,46 @@ class Bundle:
         """
         pictures = tuple(pictures)
         _check(pictures)
+        return cls._of(pictures, freedom)
+
+    @classmethod
+    def _of(cls, pictures: tuple[Picture, ...], freedom: Freedom) -> Bundle:
         each = tuple(Pictures.of(picture) for picture in pictures)
         known = [measurands(one) for one in each]
         seen, boards = tuple(one.seen for one in known), tuple(one.board for one in known)
         unknowns = Unknowns.of(pictures[0].scene, each, seen[0], freedom)
-        return cls(pictures, freedom, unknowns, seen, boards, np.zeros(unknowns.count) if moved is None else moved)
+        mean = pictures[0].scene.placement.mean
+        known = np.zeros(unknowns.count), _of_placement(unknowns, mean), np.zeros(mean.size)
+        return cls(pictures, freedom, unknowns, seen, boards, *known)
 
     def moved_by(self, numbers: np.ndarray) -> Bundle:
         """The same with part, sensors and what is estimated of the camera expected elsewhere, by the unknowns (n,);
         lights go with the sensors."""
         moved, pictures = np.zeros(self.unknowns.count), []
         for k, picture in enumerate(self.pictures, 1):
-            part, sensor = map(_in_degrees, (self.unknowns.full("part", numbers), self.unknowns.sensor(k) @ numbers))
-            camera = self.unknowns.full(self.unknowns.estimated(k), numbers)
-            pictures.append(placed(placed(picture, np.append(part, camera)), difference(np.zeros(6), sensor)))
+            sensor = _in_degrees(self.unknowns.sensor(k) @ numbers)
+            there = placed(picture, _in_degrees(self.unknowns.placement(k) @ numbers))
+            pictures.append(placed(there, difference(np.zeros(6), sensor)))
         many = range(1, len(pictures) + 1)
-        own = (*(f"sensor {k}" for k in many), *dict.fromkeys(map(self.unknowns.estimated, many)))
+        own = (*(f"sensor {k}" for k in many), *self.unknowns.all_estimated)
         for name in ("part", *own, *self.unknowns.carried):
             moved[self.unknowns.slices[name]] = numbers[self.unknowns.slices[name]]
-        return Bundle.of(pictures, self.freedom, self.moved + moved)
+        there = Bundle._of(tuple(pictures), self.freedom)
+        return replace(there, moved=self.moved + moved, before=self.before, placement=self.placement_by(numbers))
+
+    def placement_by(self, numbers: np.ndarray) -> np.ndarray:
+        """Where the part lies and what is estimated of the first camera, (6 + c,), with unknowns (n,) beside those of
+        the pictures; beside what the scene says."""
+        return combined(self.placement, _in_degrees(self.unknowns.placement(1) @ numbers))
 
     def placed_at(self, placement: np.ndarray, by_sensor: Mapping[int, np.ndarray]) -> Bundle:
         """The same with the part, and what is estimated of the camera, at a placement (6 + c,) in all pictures, and the
         sensors of some numbers where its place in their pictures alone is another one."""
-        cameras = {self.unknowns.estimated(k): placement[6:] for k in range(1, len(self.pictures) + 1)}
-        full = {"part": in_rad(placement[:6])} | cameras
+        full = {}
         for k, there in by_sensor.items():
             sensor = difference(np.zeros(6), difference(there[:6], placement[:6]))
             full[f"sensor {k}"] = in_rad(sensor)
-        return self.moved_by(self.unknowns.numbers(full))
+        return self.moved_by(_of_placement(self.unknowns, placement) + self.unknowns.numbers(full))
 
     def reach(self, numbers: np.ndarray) -> float:
         """How far unknowns (n,) of the part and the sensors move what is seen of it at most, px."""
@@ -227,7 +245,7 @@ class BundleAdjustment:
         for _ in range(_STEPS):
             expected = self.bundle.expected(numbers)
             off = [w @ _finite(one - h) for w, one, h in zip(self.whites, found, expected, strict=True)]
-            left = np.concatenate([*off, -priors @ (numbers + self.bundle.moved)])
+            left = np.concatenate([*off, priors @ (self.bundle.before - self.bundle.moved - numbers)])
             step = self.told.inverse @ left
             size = float(np.abs(self.told.rows @ step).max(initial=0.0))
             if size < _SETTLED or size >= before:
@@ -236,12 +254,25 @@ class BundleAdjustment:
         return numbers, float(left @ left)
 
     @cached_property
+    def u_placement(self) -> np.ndarray:
+        """Standard uncertainties (not variances) of the part's place, along its own axes, and of what is estimated of
+        the first camera, (6 + c,): the scene's unit, degrees; infinite of what is left open."""
+        rows = self.bundle.unknowns.placement(1)
+        return _in_degrees(np.where(self.told.is_told(rows), np.linalg.norm(self.told.gain(rows), axis=1), np.inf))
+
+    @cached_property
     def _gain(self) -> np.ndarray:
         return self.told.gain(self.bundle.nominal[1])
 
     @cached_property
     def _priors(self) -> tuple[np.ndarray, list[tuple[str, slice]]]:
         return self.bundle.unknowns.priors()
+
+
+def _of_placement(unknowns: Unknowns, placement: np.ndarray) -> np.ndarray:
+    """Unknowns (n,) of a part, and of what is estimated of all cameras, at a placement (6 + c,)."""
+    cameras = dict.fromkeys(unknowns.all_estimated, placement[6:])
+    return unknowns.numbers({"part": in_rad(placement[:6])} | cameras)
 
 
 def lost(covariance: np.ndarray, is_told: np.ndarray) -> np.ndarray:
@@ -256,8 +287,8 @@ def _finite(rows: np.ndarray) -> np.ndarray:
 
 
 def _in_degrees(numbers: np.ndarray) -> np.ndarray:
-    """A shift and a turn in rad."""
-    return np.where(np.arange(6) < 3, numbers, np.degrees(numbers))
+    """A shift, a turn in rad, and other numbers."""
+    return np.concatenate([numbers[:3], np.degrees(numbers[3:6]), numbers[6:]])
 
 
 def _check(pictures: tuple[Picture, ...]) -> None:
@@ -267,8 +298,8 @@ def _check(pictures: tuple[Picture, ...]) -> None:
     for each in pictures[1:]:
         if each.scene.quantities != first.quantities or each.scene.object != first.object:
             raise InvalidInput("pictures must be of one part with the same measurands, got others")
-        if each.scene.placement.board != first.placement.board:
-            raise InvalidInput("pictures must be of the same board beside the part, got others")
+        if each.scene.placement != first.placement:
+            raise InvalidInput("pictures must be of one placement, as the scene says it, got others")
     for each in first.quantities:
         curved = any(isinstance(feature, Wall) for feature in each.basic)
         if curved or MEASURANDS[each.kind].extreme or forms_of((each,)):

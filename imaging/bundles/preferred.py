@@ -69,6 +69,11 @@ class Preferred:
         return tuple(told)
 
     @property
+    def placed_by(self) -> BundleAdjustment:
+        """The adjustment that tells where part and sensors are: of what is ``ok`` where that tells a value."""
+        return self.good if self.by_good.any() else self.every
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """Why a value is not told; empty where it is."""
         return tuple("" if told else left_open(self.every, m) or _UNSEEN for m, told in enumerate(self.is_told))

@@ -200,6 +200,16 @@ class Unknowns:
         """Name of the block of what is estimated of that camera."""
         return "estimated" if "estimated" in self.slices else f"estimated {number}"
 
+    def placement(self, number: int) -> np.ndarray:
+        """Derivatives (6 + c, n) of the part's shift and turn, and of what is estimated of the camera of that
+        picture."""
+        return np.concatenate([self.basis("part"), self.basis(self.estimated(number))])
+
+    @property
+    def all_estimated(self) -> tuple[str, ...]:
+        """Of all cameras."""
+        return tuple(name for name in self.slices if name.split()[0] == "estimated")
+
     def vertex(self, index: int) -> str:
         """Name of a vertex' block."""
         return self.scene.solid.vertex_names[index]

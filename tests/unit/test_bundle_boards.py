@@ -17,6 +17,7 @@ from imaging.pictures import Pictures
 from imaging.placed import placed
 from planner.budgeting.bundles import bundle_budget
 from scenes import InvalidInput, Picture
+from scenes.placement import prior
 from tests.bundles import SENSOR_SD, camera, project, widths
 
 SENSORS, LIGHT = ((25.0, 60.0), (28.0, 240.0)), (25.0, 180.0)
@@ -211,8 +212,41 @@ def test_pictures_of_a_part_that_lies_elsewhere_are_measured(scene, sensors, est
         assert one.scene.camera.focal_px == pytest.approx(wanted.scene.camera.focal_px, rel=1e-3)
 
 
-def test_pictures_of_other_boards_are_refused(scene):
-    other = scene.with_(placement={"board": {"pitch": 5.4}}, uncertain=[])
+def test_pictures_of_other_boards_or_places_are_refused(scene):
+    """Also where one was put to where its part was found: where sensors stand would be no longer as the scene says."""
     first, second = pair(scene)
-    with pytest.raises(InvalidInput, match="pictures must be of the same board beside the part, got others"):
-        Bundle.of([first, second.with_scene(other)], Freedom())
+    other = second.with_scene(scene.with_(placement={"board": {"pitch": 5.4}}, uncertain=[]))
+    for wrong in (other, placed(second, np.array([0.1, 0, 0, 0, 0, 0]))):
+        with pytest.raises(InvalidInput, match="pictures must be of one placement, as the scene says it, got others"):
+            Bundle.of([first, wrong], Freedom())
+
+
+def test_where_a_part_is_expected_counts(scene):
+    """A part that lies, as its camera is, where that was expected before: chi-square 0, and it is told where.
+
+    Negative control: expected where the scene says, chi-square is what was known before of the place.
+    """
+    there = np.array([0.3, -0.2, 0.1, 0.2, -0.1, 0.3, 0.004])
+    squares = []
+    for expected in ([*there], [0.0] * 7):
+        made = scene.with_(placement={"camera": ["focal"], "expected": expected})
+        bundle = Bundle.of(pair(made), Freedom("uncertain"))
+        turned = np.where(np.isin(np.arange(7), (3, 4, 5)), np.radians(there), there)
+        numbers = bundle.unknowns.numbers({"part": turned[:6], "estimated": turned[6:]})
+        told = bundle.adjusted(noise_of(bundle.pictures))
+        found, square = told.solved(bundle.expected(numbers))
+        squares.append(square)
+        assert bundle.placement_by(numbers) == pytest.approx(there, abs=1e-3)
+    assert squares[0] < 1e-6
+    assert bundle.placement_by(found) == pytest.approx(there, abs=5 * told.u_placement.max())
+    known = np.append(prior(scene.uncertainty), 0.1)
+    assert squares[1] == pytest.approx(((there / known) ** 2).sum(), rel=0.1)
+
+
+def test_how_well_a_place_is_told_is_what_one_picture_s_adjustment_says(scene):
+    """By the board in one picture with the features in their planes, which tell nothing of it."""
+    made = scene.with_(placement={"camera": ["focal", "k1"]})
+    (picture, *_), (errors,) = pair(made), errors_of(pair(made)[:1])
+    told = Bundle.of([picture], Freedom("known", "in_plane")).adjusted([errors.of_features])
+    alone = errors.adjustment.covariance()
+    assert told.u_placement == pytest.approx(np.sqrt(np.diag(alone)), rel=1e-6)

@@ -286,6 +286,9 @@ def test_a_part_that_may_lie_the_other_way_round_is_refused_by_name(found):
     assert where.reason.startswith("two places explain the picture equally well: shift (")
     assert where.reason.count("turn (") == 2
     assert not np.isfinite(where.placement).any()
+    told = measure.bundle([(image, any_way)], "unknown", estimator="gradient")
+    assert set(told.status) == {"ambiguous"}
+    assert all(reason.startswith("picture 1: two places explain the picture") for reason in told.reason)
     nothing = measure.locate(np.full_like(image, 16.0), picture)
     assert (nothing.status, nothing.explained) == ("not_visible", 0.0)
     with pytest.raises(InvalidInput, match=r"placement\.from must be datums or board to find the part, got 'known'"):

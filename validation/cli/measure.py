@@ -160,14 +160,14 @@ def _measure_scene(given: Options) -> NoReturn:
     for each in shown:
         _check_inspection(given, each)
     images = [picture_file.read(file, Size.of_camera(known.camera)) for file, *_ in files]
-    places = [_located(image, each) for image, each in zip(images, shown, strict=True)]
-    if any(place is not None and not is_trusted(place.status) for place in places):
-        _say_lost(given, [place for place in places if place is not None])
-    shown = [each if place is None else place.picture for each, place in zip(shown, places, strict=True)]
     if given.together is not None:
         named = [file for file, *_ in files]
         correct = not given.as_measured
         together.measured(named, images, shown, given.together, given.estimator, correct=correct, as_json=given.as_json)
+    places = [_located(image, each) for image, each in zip(images, shown, strict=True)]
+    if any(place is not None and not is_trusted(place.status) for place in places):
+        _say_lost(given, [place for place in places if place is not None])
+    shown = [each if place is None else place.picture for each, place in zip(shown, places, strict=True)]
     inspected = inspection.inspect(*(_measured(given, image, each) for image, each in zip(images, shown, strict=True)))
     if given.inspection is not None:
         from validation.report import inspection_files

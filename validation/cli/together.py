@@ -11,6 +11,7 @@ from rich.table import Table
 
 import scenes
 from scenes.status import CLUTTER, legend, unsure
+from validation.cli import placement
 from validation.cli.common import progress, say
 from validation.report import cells
 from validation.report.terminal import console
@@ -35,11 +36,14 @@ def measured(
     found, rows = inspected.found, facts(inspected)
     if as_json:
         told = {"files": [str(file) for file in files], "measurands": rows, "covariance": plain(found.covariance)}
+        told |= {"placement": placement.of_place(found.pictures[0].scene, found.placement, found.u_placement)}
         say(told | {"p_value": float(found.p_value), "points": _points(found)}, True, "")
     else:
         console().print(table(rows, len(files)))
         for line in legend([row["status"] for row in rows], [row["reason"] for row in rows]):
             console().print(f" {line}", highlight=False)
+        where = placement.where(found.pictures[0].scene, found.placement, found.u_placement)
+        console().print(f"{where}.", highlight=False)
     raise typer.Exit(0 if all(row["value"] is not None for row in rows) else 1)
 
 
