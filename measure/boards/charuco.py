@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 
 from imaging.boards.windows import Marked
-from measure.boards.chessboard import Board, Squares, check_noise, check_shape, measured
+from measure.boards.chessboard import Board, Squares, check_shape, measured
+from measure.boards.noise import check_noise
 from measure.boards.reading import Legible
 from scenes.arrays import picture
 from scenes.errors import InvalidInput

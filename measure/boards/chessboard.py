@@ -7,15 +7,15 @@ from typing import Any, Protocol
 
 import numpy as np
 from scipy import sparse
-from scipy.special import chdtrc, chdtri
+from scipy.special import chdtrc
 
 from imaging.boards.fitting import Crossings, crossing_rows, fit_crossings
 from imaging.boards.windows import Marked, Windows, steps, windows
 from measure.boards.approximate import approximate_corners
 from measure.boards.bend import bends
-from measure.photo.noise import noise_sigma
+from measure.boards.noise import check_noise, of_board
 from scenes import status
-from scenes.arrays import BRIGHTEST, picture
+from scenes.arrays import picture
 from scenes.board import numbered
 from scenes.errors import InvalidInput
 
@@ -25,7 +25,6 @@ _ORDINARY = 0.8  # px of lens blur to begin with
 _ROUGH, _FINE = 0.05, 1e-3  # px: the last step of the first and of later rounds; its error is about the square
 _ROUNDS, _SETTLED = 4, 0.1  # px that corners may move in the last one
 _NEAR = 0.35  # of the way to the next corner: further off it is another one
-_LEAST_NOISE = 1e-150  # below, squares are no ordinary numbers
 _FULL = [2.0**bits - 1 for bits in range(8, 17)]  # ends of sensors' scales
 _MOST = 200  # corners along a side
 
@@ -111,19 +110,6 @@ def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | 
     return measured(image, grid, noise)
 
 
-def check_noise(noise: Any) -> None:
-    """See that a standard deviation of white noise, if given, is a number that squares are told from zero of.
-
-    Raises
-    ------
-    InvalidInput
-        If not.
-    """
-    number = isinstance(noise, int | float | np.number) and not isinstance(noise, bool)
-    if noise is not None and not (number and _LEAST_NOISE <= noise <= BRIGHTEST):
-        raise InvalidInput(f"noise must be a number more than 0 and at most {BRIGHTEST:g}, got {noise!r}")
-
-
 def check_shape(shape: Any) -> tuple[int, int] | None:
     """Columns and rows of inner corners, if given.
 
@@ -138,11 +124,6 @@ def check_shape(shape: Any) -> tuple[int, int] | None:
     if not good or not all(3 <= n <= _MOST for n in shape):
         raise InvalidInput(f"shape must be columns and rows of inner corners, 3 to {_MOST} each, got {shape!r}")
     return int(shape[0]), int(shape[1])
-
-
-def least_noise(image: np.ndarray) -> float:
-    """That of rounding to whole grey levels; of numbers that are not rounded, that of the arithmetic."""
-    return float(np.sqrt(1 / 12)) if (image == np.rint(image)).all() else 1e-9 * float(np.ptp(image)) + 1e-300
 
 
 class Layout(Protocol):
@@ -198,7 +179,7 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float | None, layout: L
         found = layout.windows(image, grid, blur)
         room = found.room
         if not room.any():
-            return _named(_nothing((columns, rows), _noise(image, noise), len(room)), seen)
+            return _named(_nothing((columns, rows), of_board(image, noise), len(room)), seen)
         some, bend = found.some(room), layout.bends(grid)[room] * (turn > 0)
         fitted = fit_crossings(some, shape[room], bend, _FINE if turn else _ROUGH)
         away = np.linalg.norm(fitted.shape[:, :2] - shape[room, :2], axis=1)
@@ -209,21 +190,8 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float | None, layout: L
         moved = np.nanmax(np.abs(grid - before))
         if turn and moved < _SETTLED:  # windows and bends are those of the corners as they are
             break
-    noise = _noise(image, noise, fitted)
+    noise = of_board(image, noise, fitted)
     return _named(_board((columns, rows), room, fitted, noise, _clipped(image, some)), seen)
-
-
-def _noise(image: np.ndarray, given: float | None, fitted: Crossings | None = None) -> float:
-    """Standard deviation of a pixel's noise: given, or told by the image; at least that of rounding.
-
-    What is printed or lies beside the corners makes `noise_sigma` too large. Residuals of crossings do not know of it,
-    but grow where the model fails, so the lesser one is told: a model that fails is seen as it was.
-    """
-    told = given or noise_sigma(image)
-    if given is None and fitted is not None and fitted.converged.any():
-        middle = fitted.square / chdtri(fitted.freedom, 0.5)
-        told = min(told, float(np.sqrt(np.median(middle[fitted.converged]))))
-    return max(float(told), least_noise(image))
 
 
 def respond(image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = Squares()) -> sparse.csr_array:

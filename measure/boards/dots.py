@@ -11,8 +11,8 @@ from scipy.special import chdtrc
 
 from imaging.boards.dot_fitting import dot_reach, dot_rows, fit_dots
 from imaging.boards.windows import steps
-from measure.boards.chessboard import Board, check_noise, check_shape
-from measure.photo.noise import noise_sigma
+from measure.boards.chessboard import Board, check_shape
+from measure.boards.noise import check_noise, of_board
 from scenes import status
 from scenes.arrays import picture
 from scenes.errors import InvalidInput
@@ -23,7 +23,6 @@ _FILLED = 0.85  # part of its ellipse that a blot fills at least, and the other 
 _NEAR = 0.3  # of the way to the next dot: where it is expected
 _LEAST_GAP = 1.5  # px beside a dot that have to be seen
 _FAINTEST = 3.0  # times the noise: the contrast of a dot
-_ROUNDING = 1 / 12
 _FALSE_ALARM = 0.01  # of all dots of a grid together
 
 
@@ -50,7 +49,6 @@ def dot_grid(image: Any, shape: tuple[int, int] | None = None, noise: float | No
     """
     image, shape = picture(image), check_shape(shape)
     check_noise(noise)
-    noise = max(noise_sigma(image), _ROUNDING**0.5) if noise is None else float(noise)
     found = [_ordered(_blots(image, bright)) for bright in (False, True)]
     grid = max(found, key=lambda each: np.isfinite(each[..., 0]).sum())
     if np.isfinite(grid[..., 0]).sum() < _FEWEST or min(grid.shape[:2]) < 3:
@@ -152,9 +150,9 @@ def respond(image: np.ndarray, board: Board, grid: np.ndarray) -> sparse.csr_arr
     return sparse.csr_array((rows.ravel(), (row.ravel(), column.ravel())), (2 * n, image.size))
 
 
-def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
+def measured(image: np.ndarray, grid: np.ndarray, noise: float | None) -> Board:
     """The likeliest centre of each dot about which there is room; ``grid`` (rows, columns, 5) has x, y, a, b, px, and
-    angle, degrees, of each."""
+    angle, degrees, of each. White noise is of a standard deviation, which the image tells where it is None."""
     blots, way = grid.reshape(-1, 5), _ways(grid)
     state = np.where(np.isfinite(way) & np.isfinite(blots[:, 0]), status.OK, status.NOT_VISIBLE).astype(object)
     reach = dot_reach(blots[:, 2], way)
@@ -165,8 +163,9 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float) -> Board:
     which = np.flatnonzero(state == status.OK)
     if not which.size:
         return Board(grid.shape[1::-1], np.full((len(blots), 2), np.nan), np.full((len(blots), 2, 2), np.nan),
-                     tuple(state), np.full(len(blots), np.nan), noise, np.nan)  # fmt: skip
+                     tuple(state), np.full(len(blots), np.nan), of_board(image, noise), np.nan)  # fmt: skip
     found = fit_dots(image, blots[which], reach[which])
+    noise = of_board(image, noise, found)
     fit = chdtrc(found.freedom, found.square / noise**2)
     limit = 1 - (1 - _FALSE_ALARM) ** (1 / len(which))
     state[which] = np.select(

@@ -11,7 +11,8 @@ import numpy as np
 from imaging.boards.windows import Windows, steps, wedges
 from measure.boards.bend import bends_at
 from measure.boards.charuco import check_marker
-from measure.boards.chessboard import Board, check_noise, check_shape, measured
+from measure.boards.chessboard import Board, check_shape, measured
+from measure.boards.noise import check_noise
 from measure.boards.reading import Legible
 from scenes.arrays import picture
 from scenes.board import numbered

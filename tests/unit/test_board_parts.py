@@ -13,9 +13,10 @@ from imaging.boards.windows import steps, windows
 from measure.boards import chessboard
 from measure.boards.approximate import even
 from measure.boards.camera import CameraCalibration, _calibration, _check
-from measure.boards.chessboard import _board, _clipped, _noise, _nothing, _started, check_shape, least_noise
+from measure.boards.chessboard import _board, _clipped, _nothing, _started, check_shape
 from measure.boards.elimination import Block, covariance, minimised
 from measure.boards.growing import _alternates, _alternation, _next, grown, trimmed
+from measure.boards.noise import least_noise, of_board
 from measure.boards.parameters import read_model
 from measure.boards.view import on_board
 from measure.photo import board_noise
@@ -223,10 +224,10 @@ def test_noise_is_the_lesser_of_the_pictures_and_of_what_crossings_leave(left, t
     share = np.where(np.arange(400) % 5 == 0, 3.0, 1.0) * left
     square = share**2 * rng.chisquare(60, 400)
     fitted = Crossings(*np.zeros((2, 400)), square, np.full(400, 60), np.full(400, 99.0), np.ones(400, bool))
-    assert _noise(image, None, fitted) == pytest.approx(told, rel=0.06)  # 0.03 found: a fifth moves the median
-    assert _noise(image, 0.3, fitted) == 0.3
+    assert of_board(image, None, fitted) == pytest.approx(told, rel=0.06)  # 0.03 found: a fifth moves the median
+    assert of_board(image, 0.3, fitted) == 0.3
     lost = Crossings(*np.zeros((2, 400)), square, np.full(400, 60), np.full(400, 99.0), np.zeros(400, bool))
-    assert _noise(image, None, lost) == pytest.approx(1.0, rel=0.02)
+    assert of_board(image, None, lost) == pytest.approx(1.0, rel=0.02)
 
 
 @pytest.mark.parametrize("end", [0.0, 255.0, 1023.0])

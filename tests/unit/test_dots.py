@@ -12,6 +12,7 @@ import measure
 from measure.boards.camera import DEFAULT_MODEL
 from measure.boards.eccentricity import offsets
 from measure.boards.parameters import read_model
+from measure.photo.noise import noise_sigma
 from scenes import InvalidInput
 from tests.boards import SMALL, poses
 from tests.commands import ice
@@ -56,6 +57,14 @@ def test_centres_are_those_of_the_images_of_dots(grids, seen):
     assert 0.82 < away.std() < 1.18
     assert abs(away.mean()) < 4 / np.sqrt(280)
     assert np.sqrt((raw**2).mean()) > 1.5
+
+
+def test_noise_is_told_by_what_dots_leave(images):
+    """Second differences of the picture take dots' borders for noise, 4 % of it."""
+    rng = np.random.default_rng(8)
+    seen = [image + NOISE * rng.standard_normal(image.shape) for image in images]
+    assert np.mean([measure.dot_grid(each).noise for each in seen]) == pytest.approx(NOISE, rel=0.015)
+    assert np.mean([noise_sigma(each) for each in seen]) > 1.03 * NOISE
 
 
 def test_radius_is_about_the_dots(grids):
