@@ -16,7 +16,7 @@ from planner.prediction import Prediction, predict
 from planner.search.candidates import DEAREST, rounded
 from planner.search.grid import Grid, as_poses
 from planner.search.objective import Aim, Report, SearchProblem
-from planner.search.sets import fast_table, information
+from planner.search.pool import fast_table, information
 from scenes import InvalidInput, Pose, Scene
 from scenes.results import Shown, finite, poses
 from scenes.status import is_trusted

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from planner.combining import Combination
+from planner.design import DEFAULT_HOLD, Choice, Hold, Vary
 from planner.prediction import Prediction
-from scenes import Pose, Scene
+from scenes import Picture, Pose, Scene
 from scenes.results import Shown, finite, poses
 
 
@@ -24,11 +25,24 @@ class View:
         Of the free light, or of each.
     prediction : Prediction
         Of this picture alone, looked at closely.
+    choice : Choice or None
+        What stands before lens and lamp, where it is not the scene's own.
     """
 
     sensor: Pose
     light: Pose | tuple[Pose, ...]
     prediction: Prediction
+    choice: Choice | None = None
+
+    @property
+    def place(self) -> tuple[Pose, Pose | tuple[Pose, ...], Choice | None]:
+        """What two pictures that are the same have in common."""
+        return self.sensor, self.light, self.choice
+
+    @property
+    def picture(self) -> Picture:
+        """Of the scene with its choice: ready to predict, render and measure."""
+        return self.prediction.picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +132,12 @@ class Views(Shown):
         What `ViewSet.over_repeats` can be at most, of the grid's best pair and however many pictures of the grid, if a
         glance is right and nothing is clutter; 1 where one picture sees all best. None as of `ViewSet.bound`, and
         where no picture measures all.
+    vary : tuple of str or None
+        What was chosen for each picture beside its poses.
+    hold : {"time", "white"}
+        What is equal then: exposure time, or the grey level of a white diffuse surface.
+    own : tuple of ViewSet or None
+        The best sets with the scene's own choice in all pictures, where others were tried.
     """
 
     scene: Scene
@@ -129,6 +149,16 @@ class Views(Shown):
     looked: int
     guarantee: str
     most_over_repeats: float | None
+    vary: tuple[Vary, ...] | None = None
+    hold: Hold = DEFAULT_HOLD
+    own: tuple[ViewSet, ...] | None = None
+
+    def over_own(self, index: int) -> float | None:
+        """How many times as large what is minimised is by the scene's own choice, of the index-th set; None where that
+        does not measure as many quantities, or no other was tried."""
+        if self.own is None or len(self.own[index].lost) != len(self.sets[index].lost):
+            return None
+        return self.own[index].minimised / self.sets[index].minimised
 
     def as_rows(self) -> list[dict[str, Any]]:
         """One record a set, picture and quantity: poses, what the picture alone tells, and what all of them do."""

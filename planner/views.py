@@ -11,27 +11,28 @@ import numpy as np
 from imaging.models import DEFAULT_MODEL, ModelName
 from planner.combining import Combination, combine
 from planner.constraints import Constraints
+from planner.design import DEFAULT_HOLD, Hold, Vary, check_vary
 from planner.planning import COARSE_STEP
 from planner.search.candidates import SettingUp
+from planner.search.choices import join_choices, join_turned
 from planner.search.exhaustive import has_bound
 from planner.search.grid import Grid, as_poses
 from planner.search.objective import DEFAULT_OBJECTIVE, DEFAULT_OVER, Aim, Objective, Over, Report, SearchProblem
+from planner.search.pool import Pool, World, fast_table, settings_of
 from planner.search.sets import (
     MOST_SETS,
     PictureInformation,
-    Pool,
     all_ok,
     alone,
     every_set,
-    fast_table,
     front,
     greedy,
     least_value,
     sets_of,
-    settings_of,
     undominated,
     undominated_shared,
 )
+from planner.search.varying import POSE_STEP
 from planner.view_sets import View, Views, ViewSet
 from scenes import InvalidInput, Pose, Quantity, Scene
 
@@ -40,6 +41,7 @@ MOST_VIEWS = 12
 _FINE_STEP = 5.0  # degrees, where a pair takes microseconds
 _MOST_NUMBERS = 30_000_000  # pairs x quantities that a grid may have
 _TRACED = 20  # settings for each picture of a set that are ray-traced at most
+_TURNS = (15.0, 7.5)  # degrees that polarisers of chosen pictures are turned by, one after the other
 
 
 def plan_views(
@@ -55,6 +57,8 @@ def plan_views(
     light: Any = None,
     share: Share | None = None,
     refined: bool = True,
+    vary: tuple[Vary, ...] | None = None,
+    hold: Hold = DEFAULT_HOLD,
     report: Report | None = None,
 ) -> Views:
     """Find ``count`` pictures, each of one sensor and light, that together measure all quantities best.
@@ -83,6 +87,12 @@ def plan_views(
     share : {"sensor", "light"}, optional
         Hold one the same in all pictures of a set: one camera and several lamps, or the reverse. Not refined; of one
         free light.
+    vary, hold
+        As of `plan`: polarisers, lamp and filter are chosen for each picture (`View.choice`), angles first every 30
+        degrees; `Views.own` are the best sets with the scene's own. Not with ``share``.
+    vary, hold
+        As of `plan`: each picture has polarisers, lamp and filter of its own (`View.choice`); `Views.own` are the best
+        pictures with the scene's own. Nothing can be shared then.
 
     Raises
     ------
@@ -99,6 +109,10 @@ def plan_views(
     aim = _aim(scene, count, objective, over, model, share)
     if share is not None and len(scene.free) != 1:
         raise InvalidInput(f"share must be left out unless one light is free, got {share!r} of {len(scene.free)}")
+    if vary is not None:
+        check_vary(scene, vary, hold)
+        if share is not None:
+            raise InvalidInput(f"vary must be left out with share, got {','.join(vary)}")
     if not scene.placement.is_known:
         raise InvalidInput(f"placement.from must be known for several pictures, got {scene.placement.source!r}")
     report, limits = report or (lambda *_: None), (constraints or Constraints()).on_side_of(scene)
@@ -111,14 +125,37 @@ def plan_views(
     if not told.any():
         raise InvalidInput("constraints must leave a setting that can measure, got none")
     pool, groups = _pool(problem, grid, poses, told, share, count)
-    _trace(pool, groups, count, report)
-    if refined and grid.free and share is None:
-        _refine(pool, count, step, report)
+    refine_by = step if refined and grid.free and share is None else None
+    _look(pool, groups, count, refine_by, report)
     is_whole = share is None and len(scene.free) < 2
     bounds, most = _bounds(aim, told, count) if is_whole else ([None] * count, None)
-    sets = _sets(pool, groups, count, bounds)
-    guarantee = _guarantee(step, share, len(scene.free))
-    return Views(scene, aim.over, model, share, sets, pairs, len(pool.traced), guarantee, most)
+    sets, own = _sets(pool, groups, count, bounds), None
+    if vary is not None:
+        own, coarse = sets, Grid.of(scene, problem.constraints, max(POSE_STEP, step), sensor, light)
+        _vary(pool, vary, hold, coarse, count, refine_by and coarse.step_deg, report)
+        sets, most = _sets(pool, None, count, [None] * count), None
+    guarantee = _guarantee(step, share, len(scene.free), varied=vary is not None)
+    return Views(scene, aim.over, model, share, sets, pairs, len(pool.traced), guarantee, most, vary, hold, own)
+
+
+def _look(pool: Pool, groups: np.ndarray | None, count: int, step: float | None, report: Report) -> None:
+    """Closely at what is chosen, and, with a grid's step, at what a descent of its poses finds."""
+    _trace(pool, groups, count, report)
+    if step is not None:
+        _refine(pool, count, step, report)
+
+
+def _vary(
+    pool: Pool, vary: tuple[Vary, ...], hold: Hold, grid: Grid, count: int, step: float | None, report: Report
+) -> None:
+    """Let pictures have other choices: at the pairs of a coarse grid, then turned a little where they were chosen."""
+    join_choices(pool, vary, hold, grid, report)
+    _look(pool, None, count, step, report)
+    for turn in _TURNS:
+        chosen = _chosen(pool.known(), np.arange(len(pool.seen)), None, count)
+        rows = {int(pool.seen[member]) for members in chosen for member in members}
+        join_turned(pool, rows, vary, hold, turn)
+        _trace(pool, None, count, report)
 
 
 def _glanced(problem: SearchProblem, grid: Grid, report: Report) -> tuple[np.ndarray, np.ndarray]:
@@ -166,7 +203,7 @@ def _pool(
     aim = problem.objective
     rows = undominated(told, aim) if share is None else undominated_shared(told, aim, share, count)
     s, k = np.unravel_index(rows, told.shape[:2])
-    pool = Pool(SettingUp(problem, grid.held), poses[s, k], told.reshape(-1, told.shape[-1])[rows])
+    pool = Pool(World(None, SettingUp(problem, grid.held)), poses[s, k], told.reshape(-1, told.shape[-1])[rows])
     return pool, None if share is None else s if share == "sensor" else k
 
 
@@ -196,7 +233,7 @@ def _grouped(rows: np.ndarray, groups: np.ndarray | None) -> Iterator[tuple[int,
 
 def _trace(pool: Pool, groups: np.ndarray | None, count: int, report: Report) -> None:
     """Choose, ray-trace what is chosen and choose again, until nothing new is chosen or 20 a picture were traced."""
-    everything, most = np.arange(len(pool.poses)), _TRACED * count
+    everything, most = np.arange(len(pool.poses)), len(pool.traced) + _TRACED * count
     while len(pool.traced) < most:
         chosen = _chosen(pool.expected(), everything, groups, count)
         fresh = [row for row in dict.fromkeys(row for members in chosen for row in members) if row not in pool.traced]
@@ -238,7 +275,7 @@ def _sets(pool: Pool, groups: np.ndarray | None, count: int, bounds: list[float 
     rows = np.arange(len(seen))
     chosen = _chosen(table, rows, own, count)
     first = table.of_sets(np.array(chosen[0])).at(0)
-    made, quantities = [], pool.problem.scene.quantities
+    made, quantities = [], pool.worlds[0].problem.scene.quantities
     for members, bound in zip(chosen, bounds, strict=True):
         lost, value, _ = table.of_sets(np.array(members)).at(0)
         views = tuple(_view(pool, int(seen[member])) for member in members)
@@ -278,12 +315,14 @@ def _exhaustive(table: PictureInformation, rows: np.ndarray, groups: np.ndarray 
 
 def _view(pool: Pool, row: int) -> View:
     sensor, lights = pool.setting(row)
-    return View(Pose(*map(float, sensor)), as_poses(lights), pool.traced[row])
+    return View(Pose(*map(float, sensor)), as_poses(lights), pool.traced[row], pool.world(row).choice)
 
 
-def _guarantee(step: float, share: str | None, lights: int) -> str:
+def _guarantee(step: float, share: str | None, lights: int, *, varied: bool) -> str:
     held = "" if share is None else f", the same {share} in all"
     rest = f"of all pairs of the {step:g} degree grid only the bound is known"
     if lights > 1:
         rest = "where else several lights might stand is not known"
+    if varied:
+        rest = f"other choices were tried at the pairs of a {max(POSE_STEP, step):g} degree grid alone"
     return f"no exchange of one picture for another that was looked at makes a set better{held}; {rest}"

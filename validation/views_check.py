@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ import planner
 import render
 from measure import Correction
 from render import Quality
-from scenes import Picture, Pose, status
+from scenes import Picture, status
 from scenes.status import counted, is_trusted
 from validation import simulation, statistics
 from validation.batch.measurands import independent
@@ -127,21 +128,17 @@ def check_views(
     began = time.perf_counter()
     if found.model == "paper":
         return ViewsCheck((), None, "the paper's model has a free scale", 0.0)
-    wanted: dict[tuple[Pose, Pose], int] = {}
+    wanted, pictures = Counter(), {}
     for each in found.sets:
-        for key in set(map(_key, each.views)):
-            wanted[key] = max(wanted.get(key, 0), sum(_key(view) == key for view in each.views))
+        wanted |= Counter(view.place for view in each.views)
+        pictures |= {view.place: view.picture for view in each.views}
     shots = {}
-    for number, (key, repeats) in enumerate(wanted.items()):
+    for number, (place, repeats) in enumerate(wanted.items()):
         report("pictures", number, len(wanted))
-        shots[key] = _shot(Picture.of(found.scene, *key), repeats, images, (seed, number), quality)
+        shots[place] = _shot(pictures[place], repeats, images, (seed, number), quality)
     report("pictures", len(wanted), len(wanted))
-    told = [row for each in found.sets for row in _rows(found.scene, each, shots)]
+    told = [row for each in found.sets for row in _rows(each, shots)]
     return judge(told, time.perf_counter() - began)
-
-
-def _key(view: planner.View) -> tuple[Pose, Pose]:
-    return view.sensor, view.light
 
 
 def _shot(picture: Picture, repeats: int, images: int, seed: tuple[int, int], quality: Quality) -> _Shot:
@@ -156,14 +153,13 @@ def _shot(picture: Picture, repeats: int, images: int, seed: tuple[int, int], qu
     return _Shot(values.object.reshape(repeats, images, -1) - np.nan_to_num(off.bias), known.covariance, off)
 
 
-def _rows(scene, chosen: planner.ViewSet, shots: dict) -> Iterator[tuple[CheckedQuantity, np.ndarray]]:
+def _rows(chosen: planner.ViewSet, shots: dict) -> Iterator[tuple[CheckedQuantity, np.ndarray]]:
     """The quantities of one set of pictures, each with its combined values (images,)."""
-    times: dict[tuple[Pose, Pose], int] = {}
-    values, own = [], [shots[_key(view)] for view in chosen.views]
+    times: Counter = Counter()
+    values, own = [], [shots[view.place] for view in chosen.views]
     for view, shot in zip(chosen.views, own, strict=True):
-        again = times.get(_key(view), 0)
-        times[_key(view)] = again + 1
-        values.append(shot.values[again])
+        values.append(shot.values[times[view.place]])
+        times[view.place] += 1
     both, stack = chosen.combination, np.stack(values)
     weighted, jointly = both.weighted(stack), both.least_squares(stack)
     with np.errstate(invalid="ignore"):
@@ -204,8 +200,8 @@ def _taken_off(chosen: planner.ViewSet, own: list[_Shot]) -> dict[str, np.ndarra
 
     with np.errstate(invalid="ignore"):
         square = np.zeros(weights.shape[1])
-        for key in {_key(view) for view in chosen.views}:
-            alike = [_key(view) == key for view in chosen.views]
+        for place in {view.place for view in chosen.views}:
+            alike = [view.place == place for view in chosen.views]
             whole = weights[alike].sum(0)
             square += np.where(whole > 0, (whole * own[alike.index(True)].off.beside) ** 2, 0.0)
         return {

@@ -8,28 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations_with_replacement, islice
 from typing import Protocol
 
 import numpy as np
 
-from imaging.geometry.projection import direction
-from planner.prediction import Prediction, predict
-from planner.search.candidates import DEAREST, SettingUp
-from planner.search.grid import Grid, as_poses
-from planner.search.lights import best_lights
-from planner.search.local import refine
-from planner.search.objective import Aim, Report, SearchProblem
-from scenes.status import is_trusted
+from planner.search.candidates import DEAREST
+from planner.search.objective import Aim
 
 MOST_SETS = 200_000  # that are tried one by one
 _CHUNK = 20_000
 _BLOCK = 4096  # pictures compared at a time with those that are kept
 SEEDS, SMALL = 64, 4  # pictures, of them all and of a set, that are few enough to begin it with each of them
 _GROUPS = 24  # places of what is shared that are searched on
-_ALIKE = 15.0  # degrees: beside a picture with clutter, what is clutter there is taken to be so until it is traced
-_SIZES = (0.7, 0.15)  # grid steps: of the first simplex of a local search
 _LESS = 1 - 1e-9  # times what is minimised: what differs less is the same
 
 
@@ -262,42 +254,6 @@ def _least_sum(told: np.ndarray, rounds: int = 300) -> tuple[float, np.ndarray]:
     return bound, weights
 
 
-def information(variances: np.ndarray, aim: Aim) -> np.ndarray:
-    """1 / (share x variance) of variances (..., M); 0 where infinite."""
-    with np.errstate(divide="ignore"):
-        return np.where(np.isfinite(variances), 1 / (variances * aim.shares), 0.0)
-
-
-def fast_table(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> np.ndarray:
-    """Information of every pair of sensors (S, 2) and lights (L, 2), shape (S, L, M); 0 where not feasible."""
-    told = np.empty((len(sensors), len(lights), len(problem.scene.quantities)))
-    for part, errors, allowed in problem.table(sensors, lights, report):
-        told[part] = information(errors.variances_object, problem.objective) * allowed[..., None]
-    return told
-
-
-def settings_of(problem: SearchProblem, grid: Grid, report: Report) -> tuple[np.ndarray, np.ndarray]:
-    """Sensors of a grid, each with the several lights that are best for all quantities, and for each alone.
-
-    Settings (P, 2 + 2 F), and their information (P, M); 0 where not feasible.
-    """
-    scene, poses, told = problem.scene, [], []
-    count = len(scene.quantities)
-    for each in (problem, *(_of_one(problem, m) for m in range(count if count > 1 else 0))):
-        lights = best_lights(each, grid, "given", report).lights
-        allowed = problem.constraints.allowed(scene, grid.sensors, lights)
-        variances = problem.errors(grid.sensors, lights).variances_object
-        poses.append(np.concatenate([grid.sensors, lights], 1))
-        told.append(information(variances, problem.objective) * allowed[:, None])
-    return np.concatenate(poses), np.concatenate(told)
-
-
-def _of_one(problem: SearchProblem, m: int) -> SearchProblem:
-    """Of the m-th quantity alone."""
-    scene = problem.scene.tried(measurands=(problem.scene.measurands[m],))
-    return replace(problem, scene=scene, objective=Aim.of(scene.quantities, problem.objective.unit))
-
-
 def undominated(told: np.ndarray, aim: Aim) -> np.ndarray:
     """Flat indices of pairs that no other dominates, and each sensor's best for the objective and each measurand."""
     flat = told.reshape(-1, told.shape[-1])
@@ -337,114 +293,3 @@ def undominated_shared(told: np.ndarray, aim: Aim, share: str, count: int) -> np
 
 def all_ok(told: np.ndarray, aim: Aim) -> PictureInformation:
     return PictureInformation(told, np.zeros_like(told), aim.over)
-
-
-class Pool:
-    """Candidates, rows of ``poses``; grows when a local search finds one beside them.
-
-    Attributes
-    ----------
-    ways : SettingUp
-        Of the search problem's sensor and light.
-    poses : ndarray, shape (P, 2 + 2 F)
-        Sensor and free lights, each polar angle and azimuth, degrees, to the digits at which they are set up.
-    told : ndarray, shape (P, M)
-        Their information by fast evaluation (`information`).
-    traced : dict
-        Predictions of the rows that were ray-traced.
-    steady : dict
-        Of these rows which quantities are measured around them, too, shape (M,).
-    """
-
-    def __init__(self, ways: SettingUp, poses: np.ndarray, told: np.ndarray) -> None:
-        self.ways, self.problem, self.told = ways, ways.problem, told
-        self.poses = np.concatenate(ways.to_digits(poses[:, :2], poses[:, 2:]), axis=1)
-        self.traced: dict[int, Prediction] = {}
-        self.steady: dict[int, np.ndarray] = {}
-
-    def trace(self, row: int) -> None:
-        """Ray-traced evaluation of a row, once."""
-        if row not in self.traced:
-            sensor, lights = self.setting(row)
-            self.traced[row] = predict(self.problem.scene, tuple(sensor.tolist()), as_poses(lights), self.problem.model)
-            self.steady[row] = self.ways.steady(sensor, lights)
-
-    def setting(self, row: int) -> tuple[np.ndarray, np.ndarray]:
-        """Sensor (2,) and free lights (2 F,) of a row."""
-        return self.poses[row, :2], self.poses[row, 2:]
-
-    def add(self, sensor: np.ndarray, light: np.ndarray, told: np.ndarray) -> int:
-        """A further row, poses to their digits; its number."""
-        sensor, light = (each[0] for each in self.ways.to_digits(sensor[None], light[None]))
-        self.poses = np.concatenate([self.poses, np.concatenate([sensor, light])[None]])
-        self.told = np.concatenate([self.told, told[None]])
-        return len(self.poses) - 1
-
-    @property
-    def seen(self) -> np.ndarray:
-        """Ray-traced rows, in their order."""
-        return np.array(sorted(self.traced), int)
-
-    def known(self) -> PictureInformation:
-        """What the rows `seen` tell, of what is measured around them, too, where any of them does."""
-        told = [self.traced[row].measurands for row in self.seen]
-        values = information(np.array([[each.variance_object for each in row] for row in told]), self.problem.objective)
-        steady = np.array([self.steady[row] for row in self.seen])
-        values = np.where(steady | ~steady.any(0), values, 0.0)
-        fine = np.array([[is_trusted(each.status) for each in row] for row in told])
-        return PictureInformation(np.where(fine, values, 0.0), np.where(fine, 0.0, values), self.problem.objective.over)
-
-    def expected(self) -> PictureInformation:
-        """What all rows tell: ray-traced, else by fast evaluation, cluttered as the nearest ray-traced row is."""
-        cluttered = np.zeros(self.told.shape, bool)
-        seen = self.seen
-        if len(seen):
-            known = self.known()
-            ways = [direction(self.poses[:, i : i + 2]) for i in range(0, self.poses.shape[1], 2)]
-            cosine = np.min([each @ each[seen].T for each in ways], 0)
-            nearest = cosine.argmax(1)
-            beside = cosine[np.arange(len(cosine)), nearest] > np.cos(np.radians(_ALIKE))
-            cluttered = (known.clutter > 0)[nearest] & beside[:, None]
-        ok, clutter = np.where(cluttered, 0.0, self.told), np.where(cluttered, self.told, 0.0)
-        if len(seen):
-            ok[seen], clutter[seen] = known.ok, known.clutter
-        return PictureInformation(ok, clutter, self.problem.objective.over)
-
-    def refine(self, row: int, rest: PictureInformation, step_deg: float) -> int:
-        """The row after a local search of its poses, or itself where that finds nothing better; the row's number.
-
-        Parameters
-        ----------
-        rest : PictureInformation
-            One row: what the other pictures of its set tell.
-
-        What is clutter in the row is taken to stay so on the way. If ray-traced evaluation does not bear out what the
-        fast one told, a shorter search is tried.
-        """
-        sensor, light = self.setting(row)
-        cluttered = np.array([not is_trusted(each.status) for each in self.traced[row].measurands])
-
-        def told(s: np.ndarray, k: np.ndarray) -> np.ndarray:
-            return information(self.problem.errors(s[None], k[None]).variances_object[0], self.problem.objective)
-
-        def score(s: np.ndarray, k: np.ndarray) -> tuple[int, float, float]:
-            values = told(s, k)
-            return rest.plus(np.where(cluttered, 0.0, values), np.where(cluttered, values, 0.0))
-
-        def value(s: np.ndarray, k: np.ndarray) -> float:
-            here = score(s, k)
-            return here[1] if here[0] <= begun[0] else np.inf
-
-        def ray_traced(which: int) -> tuple[int, float, float]:
-            known, at = self.known(), int(np.searchsorted(self.seen, which))
-            return rest.plus(known.ok[at], known.clutter[at])
-
-        begun = score(sensor, light)
-        for size in _SIZES:
-            end = refine(self.problem, (sensor, light), step_deg, value=value, sizes=(size,))
-            if end.value < begun[1]:
-                found = self.add(end.sensor, end.lights, told(end.sensor, end.lights))
-                self.trace(found)
-                if better(ray_traced(found), ray_traced(row)):
-                    return found
-        return row

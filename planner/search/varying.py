@@ -37,7 +37,7 @@ ANGLE_STEP = 30.0  # degrees, of either polariser
 POSE_STEP = 20.0  # degrees, or that of the plan where it is coarser
 _KEPT = 12  # pairs of poses of each choice
 _TRACED, _STARTS = 150, 6  # clearly different settings that are ray-traced, and descents
-_BANDS_WITH = 3  # angles with which all bands are tried
+BANDS_WITH = 3  # angles with which all bands are tried
 _SIZES, _POLISH = (6.0,), (3.0, 0.5)  # degrees, of a descent's simplices, and of those from its end
 _POLISHED = 3  # ends of descents that are polished
 _ROUNDS, _ENOUGH = 3, 0.998  # of polishing at most, and what a round must gain for another
@@ -114,7 +114,7 @@ class Variation:
                 report("trying choices", count, whole)
             return found
 
-        bands = min(_BANDS_WITH, len(angles)) * (len(bands_of(self.scene)) - 1) if "band" in self.vary else 0
+        bands = min(BANDS_WITH, len(angles)) * (len(bands_of(self.scene)) - 1) if "band" in self.vary else 0
         whole = (len(angles) + bands) * (len(pairs[0]) + 1)
         there = tried(angles, *pairs)
         fixed, most = self._fixed(self._place(own_choice(self.scene), sensor, light), there)
@@ -155,7 +155,7 @@ class Variation:
         """The other bands with those angles that were best so far."""
         if "band" not in self.vary:
             return []
-        angles = list(dict.fromkeys(place.choice for place in sorted(found, key=_value)))[:_BANDS_WITH]
+        angles = list(dict.fromkeys(place.choice for place in sorted(found, key=_value)))[:BANDS_WITH]
         return [
             replace(choice, lamp=lamp, filter=filter_)
             for choice, (lamp, filter_) in product(angles, bands_of(self.scene)[1:])
@@ -266,7 +266,7 @@ class Variation:
 
 _GUARANTEE = (
     f"none: the lowest end of up to {_STARTS} descents from the best of a grid (angles every {ANGLE_STEP:g} degrees and"
-    f" none, poses every {POSE_STEP:g}, all bands with the best {_BANDS_WITH} angles), at worst the fixed choice"
+    f" none, poses every {POSE_STEP:g}, all bands with the best {BANDS_WITH} angles), at worst the fixed choice"
 )
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planner.search import sets
+from planner.search import pool, sets
 from planner.search.local import Start, shifted
 from planner.search.objective import Aim
 
@@ -34,7 +34,7 @@ def table(rng):
 def test_information_adds_up_by_shares():
     """1 over share times variance; of what is not measured, 0."""
     variances = np.array([[4.0, np.inf, 0.25], [np.nan, 8.0, 2.0]])
-    assert sets.information(variances, aim("sum")).tolist() == [[1 / 8, 0, 1 / 0.75], [0, 1 / 4, 1 / 6]]
+    assert pool.information(variances, aim("sum")).tolist() == [[1 / 8, 0, 1 / 0.75], [0, 1 / 4, 1 / 6]]
 
 
 def test_pairs_that_are_not_allowed_tell_nothing(rng):
@@ -47,7 +47,7 @@ def test_pairs_that_are_not_allowed_tell_nothing(rng):
 
     scene = SimpleNamespace(quantities=(1, 2, 3))
     problem = SimpleNamespace(table=table, scene=scene, objective=aim("minimax"))
-    found = sets.fast_table(problem, np.zeros((5, 2)), np.zeros((4, 2)), None)
+    found = pool.fast_table(problem, np.zeros((5, 2)), np.zeros((4, 2)), None)
     assert found == pytest.approx(np.where(allowed[..., None], 1 / (variances * SHARES), 0))
 
 
@@ -102,13 +102,13 @@ def prediction(*told):
     return SimpleNamespace(measurands=[SimpleNamespace(variance_object=v, status=s) for v, s in told])
 
 
-def pool():
+def candidates():
     """Of five pictures two were ray-traced; only the third is beside the first, by sensor and by light."""
     poses = np.array([[30.0, 10, 40, 200], [60, 10, 40, 200], [36, 15, 45, 205], [33, 10, 40, 230], [50, 10, 41, 200]])
     told = np.array([[1.0, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12], [13, 14, 15]])
     problem = SimpleNamespace(objective=aim("sum"))
     ways = SimpleNamespace(problem=problem, to_digits=lambda *pair: pair)
-    found = sets.Pool(ways, poses, told)
+    found = pool.Pool(pool.World(None, ways), poses, told)
     found.steady = {0: np.array([True] * 3), 1: np.array([True] * 3)}
     found.traced[1] = prediction((2.0, "ok"), (np.inf, "short"), (0.5, "clutter"))
     found.traced[0] = prediction((5.0, "clutter"), (4.0, "ok"), (np.inf, "clutter"))
@@ -117,7 +117,7 @@ def pool():
 
 def test_what_is_known_of_pictures_that_were_ray_traced():
     """In their order; ok and clutter apart."""
-    found = pool()
+    found = candidates()
     assert found.seen.tolist() == [0, 1]
     known = found.known()
     assert known.ok.tolist() == [[0, 1 / 2, 0], [1 / 4, 0, 0]]
@@ -128,7 +128,7 @@ def test_what_is_known_of_pictures_that_were_ray_traced():
 def test_what_is_lost_a_little_off_counts_only_where_nothing_else_does():
     """The first quantity of the second picture is not steady, and the first one tells it; nothing steady tells the
     second."""
-    found = pool()
+    found = candidates()
     found.steady = {0: np.array([True, False, True]), 1: np.array([False, False, True])}
     known = found.known()
     assert known.ok.tolist() == [[0, 1 / 2, 0], [0, 0, 0]]
@@ -137,7 +137,7 @@ def test_what_is_lost_a_little_off_counts_only_where_nothing_else_does():
 
 def test_clutter_is_expected_beside_clutter():
     """Within 15 degrees of both sensor and light, of what tells something there; the rest is as a glance tells."""
-    found = pool()
+    found = candidates()
     # margin: the order is said
     assert around(found.poses[0, :2], found.poses[2, :2]) < 15 < around(found.poses[0, 2:], found.poses[3, 2:])
     # margin: the order is said
@@ -150,12 +150,15 @@ def test_clutter_is_expected_beside_clutter():
     assert not found.expected().clutter.any()
 
 
-def test_a_further_picture_is_the_last():
-    found = pool()
-    assert found.add(np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array([7.0, 0.0, 1.0])) == 5
-    assert found.poses[-1].tolist() == [1, 2, 3, 4]
-    assert found.told[-1].tolist() == [7, 0, 1]
-    assert found.poses.shape == (6, 4)
+def test_pictures_with_another_choice_are_the_last():
+    """Clutter beside a picture tells nothing of one from the same place with other polarisers."""
+    found = candidates()
+    ways = SimpleNamespace(problem=found.worlds[0].problem, to_digits=lambda *pair: pair)
+    found.join(pool.World("other", ways), found.poses[:1] + 0.1, np.array([[7.0, 0.0, 1.0]]))
+    assert found.poses[-1].tolist() == [30.1, 10.1, 40.1, 200.1]
+    assert found.told[-1].tolist() == found.expected().ok[-1].tolist() == [7, 0, 1]
+    assert found.of_world.tolist() == [0, 0, 0, 0, 0, 1]
+    assert found.world(5).choice == "other"
 
 
 def test_sets_and_one_more_picture(rng):

@@ -11,7 +11,8 @@ from planner import views
 from planner.constraints import Constraints
 from planner.search.grid import Grid
 from planner.search.objective import Aim, SearchProblem
-from planner.search.sets import all_ok, fast_table, least_value, settings_of
+from planner.search.pool import fast_table, settings_of
+from planner.search.sets import all_ok, least_value
 from tests.sides import sides
 
 

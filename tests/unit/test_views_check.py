@@ -13,17 +13,16 @@ A, B = (Pose(10, 20), Pose(30, 40)), (Pose(10, 20), Pose(35, 40))
 
 
 def of(*keys):
-    return SimpleNamespace(views=[SimpleNamespace(sensor=sensor, light=light) for sensor, light in keys])
+    return SimpleNamespace(views=[SimpleNamespace(place=key, picture=key) for key in keys])
 
 
 def test_each_picture_is_rendered_once_for_the_set_that_has_it_most_often(monkeypatch):
     """Noise of its own for each time; a picture differs by its light alone, too."""
     asked, said = [], []
-    monkeypatch.setattr(views_check.Picture, "of", lambda scene, sensor, light: (sensor, light))
     monkeypatch.setattr(views_check, "_shot", lambda *given: asked.append(given) or len(asked))
-    monkeypatch.setattr(views_check, "_rows", lambda scene, each, shots: [(len(each.views), shots)])
+    monkeypatch.setattr(views_check, "_rows", lambda each, shots: [(len(each.views), shots)])
     monkeypatch.setattr(views_check, "judge", lambda told, seconds: told)
-    found = SimpleNamespace(model="calibrated", scene="scene", sets=(of(A), of(A, B, A), of(B, A, B, B)))
+    found = SimpleNamespace(model="calibrated", sets=(of(A), of(A, B, A), of(B, A, B, B)))
     told = views_check.check_views(found, 50, 7, "quick", lambda *given: said.append(given))
     counts = {picture: (repeats, images) for picture, repeats, images, _, _ in asked}
     assert counts == {A: (2, 50), B: (3, 50)}

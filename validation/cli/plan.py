@@ -103,7 +103,8 @@ class Options:
     vary: Annotated[
         str | None,
         typer.Option(
-            metavar="LIST", help="Find these, too: analyser, polarisation, band (of the scene's lamps, filters)."
+            metavar="LIST",
+            help="Find these, too, of each picture: analyser, polarisation, band (of the scene's lamps, filters).",
         ),
     ] = None
     hold: Annotated[
@@ -224,7 +225,7 @@ def plan_command(given: Options) -> None:
     if given.together is not None:
         plan_bundle.run(scene, given, how)
     if given.several:
-        plan_views.run(scene, given, how, checked=bool(count))
+        plan_views.run(scene, given, how | _varied(scene, given.vary, given.hold), checked=bool(count))
         _say_unchecked(scene, given, count)
         return
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 import typer
 
 import scenes
+from planner.design import exposure_time, own_choice
 from planner.views import MOST_VIEWS
 from scenes.results import picked
 from validation.cli.common import check_left_out, progress, say
@@ -30,7 +32,7 @@ def check_options(context: typer.Context, views: int | None, share: str | None) 
         raise scenes.InvalidInput(f"--views must be 1 to {MOST_VIEWS}, got {views}")
     if share not in (None, "sensor", "light"):
         raise scenes.InvalidInput(f"--views-share must be one of sensor, light, got {share!r}")
-    check_left_out(context, "--views", "--search", "--edges", "--start", "--tolerance", "--map", "--vary", "--hold")
+    check_left_out(context, "--views", "--search", "--edges", "--start", "--tolerance", "--map")
 
 
 def run(scene: scenes.Scene, given: Options, how: dict, *, checked: bool) -> None:
@@ -82,7 +84,8 @@ def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], 
         "scene": found.scene.name,
         "objective": "object",
         **picked(found, "over", "model", "share"),
-        "views": [_set(each) for each in found.sets],
+        **(picked(found, "vary", "hold") if found.vary else {}),
+        "views": [_set(found, index) for index in range(len(found.sets))],
         **picked(found, "most_over_repeats", "pairs", "looked", "guarantee"),
         "check": None if check is None else _checked(check),
         "pictures": pictures,
@@ -90,17 +93,31 @@ def facts(found: planner.Views, check: ViewsCheck | None, pictures: list[Path], 
     })  # fmt: skip
 
 
-def _set(each: planner.ViewSet) -> dict:
+def _set(found: planner.Views, index: int) -> dict:
+    each = found.sets[index]
     both, first = each.combination, each.views[0].prediction.measurands
     return {
         "count": len(each.views),
-        "poses": [{"sensor": list(view.sensor), "light": scenes.pairs(view.light)} for view in each.views],
+        "poses": [_place(found, view) for view in each.views],
         **picked(each, "minimised", "worst_ratio", "limiting"),
         "lost": list(each.lost),
         "hard": list(each.hard),
         **picked(each, "over_one", "over_repeats", "exhaustive", "gap", "bound"),
+        **({"over_own": found.over_own(index)} if found.vary else {}),
         "measurands": [_measurand(each, m) for m in range(len(first))],
         **picked(both, "covariance", "covariance_least_squares"),
+    }
+
+
+def _place(found: planner.Views, view: planner.View) -> dict:
+    """Poses of a picture, and where it was varied what stands before lens and lamp."""
+    told = {"sensor": list(view.sensor), "light": scenes.pairs(view.light)}
+    if not found.vary:
+        return told
+    choice = view.choice or own_choice(found.scene)
+    return told | {
+        "choice": dataclasses.asdict(choice),
+        "exposure_time": exposure_time(found.scene, choice, found.hold),
     }
 
 

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner import Chosen, Plan, Varied
+from planner.design import Choice
 from scenes.results import picked
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
@@ -54,10 +55,13 @@ def choices(varied: Varied) -> list[list[str]]:
 
 
 def _chosen(name: str, chosen: Chosen) -> list[str]:
-    choice = chosen.choice
-    angles = (_angle(choice.analyser_deg), _angle(choice.polarisation_deg))
-    last = f"{chosen.exposure_time:.3g}", f"{chosen.variance:.4g}", chosen.status
-    return [name, _pose(chosen.sensor), _pose(chosen.light), *angles, choice.band, *last]
+    before = name, _pose(chosen.sensor), _pose(chosen.light)
+    return [*before, *of_choice(chosen.choice, chosen.exposure_time), f"{chosen.variance:.4g}", chosen.status]
+
+
+def of_choice(choice: Choice, time: float) -> list[str]:
+    """Cells of what stands before lens and lamp: analyser, polarisation, band, and time of exposure."""
+    return [angle(choice.analyser_deg), angle(choice.polarisation_deg), choice.band, f"{time:.3g}"]
 
 
 def proposed(varied: Varied) -> str:
@@ -125,5 +129,6 @@ def _check(checked: VaryCheck) -> dict:
     }
 
 
-def _angle(value: float | None) -> str:
+def angle(value: float | None) -> str:
+    """Of a polariser, for a cell."""
     return "none" if value is None else f"{value:.1f}"

@@ -18,7 +18,7 @@ def draw(found: Views, directory: Path) -> list[Path]:
     down = len(last.views)
     figure, axes = plt.subplots(down, 1, figsize=(WIDTH, 5.8 * down), layout="constrained", squeeze=False)
     for number, (axis, view) in enumerate(zip(axes.flat, last.views, strict=False)):
-        draw_seen(axis, found.scene, view.sensor, view.light, np.zeros((0, 2)))
+        draw_seen(axis, view.picture.scene, view.sensor, view.light, np.zeros((0, 2)))
         names = [q.name for q, used in zip(found.scene.quantities, last.combination.used[number], strict=True) if used]
         axis.set_title(f"no. {number + 1}: {axis.get_title()}\n{_wrapped(names)}", fontsize=TEXT)
     return [save(figure, path)]

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from scipy.stats import norm
 
 import planner
-from scenes import Picture, several
+from scenes import several
 from scenes.results import finite
 from validation.report import camera_words, cells, map_figure, page, station_table, station_view
 from validation.report.canvas import TEXT, WIDTH, inline, plt
@@ -100,11 +100,10 @@ def _view(found: planner.Views, number: int, asked: tuple[Requirement, ...]) -> 
     """The part in one of the pictures, with what is taken from it."""
     last = found.sets[-1]
     view, used = last.views[number], last.combination.used[number]
-    picture = Picture.of(found.scene, view.sensor, view.light)
     shown = [each if taken else None for each, taken in zip(asked, used, strict=True)]
     names = "; ".join(f"{each.number} {each.title}: {each.grade}" for each in shown if each)
     label = f"Picture {number + 1}: {names or 'nothing is taken from it'}."
-    return station_view.draw(picture, shown, None, label, f"view{number + 1}")
+    return station_view.draw(view.picture, shown, None, label, f"view{number + 1}")
 
 
 def _pictures(count: int) -> str:

@@ -9,22 +9,30 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
+from planner.design import exposure_time, own_choice
 from scenes.status import legend
 from validation.report.cells import number as _number
 from validation.report.cells import pose as _pose
 from validation.report.cells import sigma as _sigma
 from validation.report.cells import table as _table
+from validation.report.vary_table import HELD, of_choice
 from validation.views_check import CheckedQuantity, ViewsCheck
 
 _TERMS = """\
   minimised: what is said above, of all pictures together. one / it, repeats / it: how many times as large it is of the
   best single picture, and of that one taken as often, which takes as long. over exhaustive: how far above the best of
-  all sets of what was looked at. over grid's bound: over what no pictures of the grid can stay below."""
+  all sets of what was looked at."""
+_BOUND = "  over grid's bound: over what no pictures of the grid can stay below."
+_CHOICES = """\
+  own choice / it: how many times as large it is of the best pictures with the scene's own polarisers, lamp and filter.
+  analyser, polarisation: angles of the polarisers before lens and lamp, degrees; band: lamp and filter. time: of
+  exposure, 1 is that of the scene."""
 
 
 def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Group:
     """Numbers of pictures, their poses, what each measurand gains, and what rendering them says."""
-    parts = [Text(_head(found)), _numbers(found), Text(_TERMS), _poses(found), _quantities(found),
+    terms = f"{_TERMS}\n{_CHOICES if found.vary else _BOUND}"
+    parts = [Text(_head(found)), _numbers(found), Text(terms), _poses(found), _quantities(found),
              *_statuses(found.sets[-1]), Text(_searched(found, seconds))]  # fmt: skip
     if check:
         parts += [_checked(check)] if check.rows else []
@@ -35,6 +43,7 @@ def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Gr
 
 def _head(found: planner.Views) -> str:
     held = f", one {found.share} for all" if found.share else ""
+    held += f"; {', '.join(found.vary)} of each its own" if found.vary else ""
     return (
         f"{found.scene.title or found.scene.name}\n"
         f"Pictures that together measure best: least {_minimised(found)} ({found.model} model){held}"
@@ -49,30 +58,40 @@ def _minimised(found: planner.Views) -> str:
 
 def _numbers(found: planner.Views) -> Table:
     columns = ("pictures", "measured", "minimised", "worst ratio", "limited by", "one / it", "repeats / it",
-               "over exhaustive", "over grid's bound")  # fmt: skip
+               "over exhaustive", "own choice / it" if found.vary else "over grid's bound")  # fmt: skip
     table = _table("\nN pictures take N times as long: the fair comparison is with the best one repeated", *columns)
     whole = len(found.scene.quantities)
-    for each in found.sets:
+    for index, each in enumerate(found.sets):
+        over = found.over_own(index) if found.vary else each.bound and each.minimised / each.bound
         table.add_row(
             str(len(each.views)), f"{whole - len(each.lost)} of {whole}", f"{each.minimised:.4g}",
             _number(each.worst_ratio, ".3g"), each.limiting or "-", _number(each.over_one, ".3f"),
             _number(each.over_repeats, ".3f"),
             "not searched" if each.gap is None else f"{100 * each.gap:.1f} %",
-            _number(each.bound and each.minimised / each.bound, ".2f"),
+            _number(over, ".3f" if found.vary else ".2f"),
         )  # fmt: skip
     return table
 
 
 def _poses(found: planner.Views) -> Table:
-    table = _table("\nWhere they are taken", "pictures", "", "sensor", "light", "measures alone")
+    before = ("analyser", "polarisation", "band", "time") if found.vary else ()
+    table = _table("\nWhere they are taken", "pictures", "", "sensor", "light", *before, "measures alone")
     for each in found.sets:
         for number, view in enumerate(each.views, 1):
             told = view.prediction.measurands
             fine, doubtful = (sum(f.status == state for f in told) for state in ("ok", "clutter"))
             alone = f"{fine} ok" + (f", {doubtful} clutter" if doubtful else "")
             row = (str(len(each.views)) if number == 1 else "", f"no. {number}", _pose(view.sensor), _pose(view.light))
-            table.add_row(*row, alone)
+            table.add_row(*row, *_choice(found, view), alone)
     return table
+
+
+def _choice(found: planner.Views, view: planner.View) -> list[str]:
+    """What stands before lens and lamp, where that was varied."""
+    if not found.vary:
+        return []
+    choice = view.choice or own_choice(found.scene)
+    return of_choice(choice, exposure_time(found.scene, choice, found.hold))
 
 
 def _quantities(found: planner.Views) -> Table:
@@ -105,6 +124,7 @@ def _searched(found: planner.Views, seconds: float) -> str:
         f"  {found.pairs} pairs glanced at, {found.looked} settings looked at closely, in {seconds:.1f} s",
         f"  Guarantee: {found.guarantee}.",
     ]
+    lines += [f"  Equal: {HELD[found.hold]}."] if found.vary else []
     lines += [f"  {same}: no picture from elsewhere adds as much as the same one again." for same in _repeated(found)]
     if hard:
         lines.append(f"  Hard to set up: a little off the poses these cannot be measured any more: {'; '.join(hard)}.")
@@ -125,7 +145,7 @@ def _repeated(found: planner.Views) -> list[str]:
     """Pictures of the largest set that are taken from one place, in words."""
     places: dict[tuple, list[str]] = {}
     for number, view in enumerate(found.sets[-1].views, 1):
-        places.setdefault((view.sensor, view.light), []).append(str(number))
+        places.setdefault(view.place, []).append(str(number))
     return [f"No. {' and '.join(each)} are taken from one place" for each in places.values() if len(each) > 1]
 
 
