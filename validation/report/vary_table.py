@@ -8,8 +8,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner import Chosen, Plan, Varied
-from planner.design import Choice
+from planner import Chosen, Plan, Varied, View, Views
+from planner.design import Choice, exposure_time, own_choice
 from scenes.results import picked
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
@@ -24,10 +24,14 @@ HELD = {
 }
 
 
-COLUMNS = ("", "sensor", "light", "analyser", "polarisation", "band", "time", "minimised", "status")
-TERMS = """\
-  analyser, polarisation: angles of the polarisers before lens and lamp, degrees; band: lamp and filter. time: of
-  exposure, 1 is that of the scene. minimised: variance. fixed: the scene's own choice, at the best poses for it."""
+CHOICE = ("analyser", "polarisation", "band", "time")
+"""Columns of `of_choice`."""
+OF_CHOICE = (
+    "analyser, polarisation: angles of the polarisers before lens and lamp, degrees; band: lamp and filter. time: of"
+    " exposure, 1 is that of the scene."
+)
+COLUMNS = ("", "sensor", "light", *CHOICE, "minimised", "status")
+TERMS = f"  {OF_CHOICE}\n  minimised: variance. fixed: the scene's own choice, at the best poses for it."
 
 
 def report(found: Plan, checked: VaryCheck | None, seconds: float) -> Group:
@@ -127,6 +131,12 @@ def _check(checked: VaryCheck) -> dict:
         "gain_interval": checked.interval,
         **picked(checked, "p_value", "verdict"),
     }
+
+
+def of_view(found: Views, view: View) -> list[str]:
+    """The same of one of several pictures."""
+    choice = view.choice or own_choice(found.scene)
+    return of_choice(choice, exposure_time(found.scene, choice, found.hold))
 
 
 def angle(value: float | None) -> str:

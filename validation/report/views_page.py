@@ -16,6 +16,7 @@ from validation.report import camera_words, cells, map_figure, page, station_tab
 from validation.report.canvas import TEXT, WIDTH, inline, plt
 from validation.report.page_tables import Table
 from validation.report.requirements import Requirement
+from validation.report.vary_table import CHOICE, OF_CHOICE, of_view
 from validation.report.wording import what
 
 _P = 0.95
@@ -44,7 +45,7 @@ def write(found: planner.Views, path: Path) -> Path:
         "above": _ABOVE, "note": station_table.note(asked, _NOTE),
     }  # fmt: skip
     sections = [
-        page.Section("Where they stand", tables=[_poses(last)]),
+        page.Section("Where they stand", tables=[_poses(found)]),
         page.Section("How many pictures are worth it", answer=_worth(found), tables=[_numbers(found)]),
         page.Section("How it was found", answer=_searched(found)),
     ]  # fmt: skip
@@ -110,14 +111,18 @@ def _pictures(count: int) -> str:
     return "one picture" if count == 1 else f"{count} pictures"
 
 
-def _poses(found: planner.ViewSet) -> Table:
-    rows = []
-    for number, view in enumerate(found.views, 1):
-        told = view.prediction.measurands
-        taken = [each.name for each, used in zip(told, found.combination.used[number - 1], strict=True) if used]
-        rows.append([str(number), cells.pose(view.sensor), cells.pose(view.light), ", ".join(taken) or "nothing"])
-    return Table("Where the pictures are taken", ["picture", "camera", "lamp", "taken from it"], rows,
-                 "Places of camera and lamp: (angle from the vertical, azimuth), degrees.", words=True)  # fmt: skip
+def _poses(found: planner.Views) -> Table:
+    last, rows = found.sets[-1], []
+    for number, (view, taken) in enumerate(zip(last.views, last.combination.used, strict=True), 1):
+        names = [each.name for each, used in zip(view.prediction.measurands, taken, strict=True) if used]
+        before = of_view(found, view) if found.vary else []
+        rows.append(
+            [str(number), cells.pose(view.sensor), cells.pose(view.light), *before, ", ".join(names) or "nothing"]
+        )
+    columns = ["picture", "camera", "lamp", *(CHOICE if found.vary else ()), "taken from it"]
+    note = "Places of camera and lamp: (angle from the vertical, azimuth), degrees."
+    note += f" {OF_CHOICE}" if found.vary else ""
+    return Table("Where the pictures are taken", columns, rows, note, words=True)
 
 
 def _numbers(found: planner.Views) -> Table:

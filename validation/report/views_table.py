@@ -9,13 +9,12 @@ from rich.table import Table
 from rich.text import Text
 
 import planner
-from planner.design import exposure_time, own_choice
 from scenes.status import legend
 from validation.report.cells import number as _number
 from validation.report.cells import pose as _pose
 from validation.report.cells import sigma as _sigma
 from validation.report.cells import table as _table
-from validation.report.vary_table import HELD, of_choice
+from validation.report.vary_table import CHOICE, HELD, OF_CHOICE, of_view
 from validation.views_check import CheckedQuantity, ViewsCheck
 
 _TERMS = """\
@@ -23,15 +22,12 @@ _TERMS = """\
   best single picture, and of that one taken as often, which takes as long. over exhaustive: how far above the best of
   all sets of what was looked at."""
 _BOUND = "  over grid's bound: over what no pictures of the grid can stay below."
-_CHOICES = """\
-  own choice / it: how many times as large it is of the best pictures with the scene's own polarisers, lamp and filter.
-  analyser, polarisation: angles of the polarisers before lens and lamp, degrees; band: lamp and filter. time: of
-  exposure, 1 is that of the scene."""
+_CHOICES = "  own choice / it: the same of the best pictures with the scene's own polarisers, lamp and filter."
 
 
 def report(found: planner.Views, check: ViewsCheck | None, seconds: float) -> Group:
     """Numbers of pictures, their poses, what each measurand gains, and what rendering them says."""
-    terms = f"{_TERMS}\n{_CHOICES if found.vary else _BOUND}"
+    terms = f"{_TERMS}\n{_CHOICES}\n  {OF_CHOICE}" if found.vary else f"{_TERMS}\n{_BOUND}"
     parts = [Text(_head(found)), _numbers(found), Text(terms), _poses(found), _quantities(found),
              *_statuses(found.sets[-1]), Text(_searched(found, seconds))]  # fmt: skip
     if check:
@@ -74,7 +70,7 @@ def _numbers(found: planner.Views) -> Table:
 
 
 def _poses(found: planner.Views) -> Table:
-    before = ("analyser", "polarisation", "band", "time") if found.vary else ()
+    before = CHOICE if found.vary else ()
     table = _table("\nWhere they are taken", "pictures", "", "sensor", "light", *before, "measures alone")
     for each in found.sets:
         for number, view in enumerate(each.views, 1):
@@ -82,16 +78,8 @@ def _poses(found: planner.Views) -> Table:
             fine, doubtful = (sum(f.status == state for f in told) for state in ("ok", "clutter"))
             alone = f"{fine} ok" + (f", {doubtful} clutter" if doubtful else "")
             row = (str(len(each.views)) if number == 1 else "", f"no. {number}", _pose(view.sensor), _pose(view.light))
-            table.add_row(*row, *_choice(found, view), alone)
+            table.add_row(*row, *(of_view(found, view) if found.vary else ()), alone)
     return table
-
-
-def _choice(found: planner.Views, view: planner.View) -> list[str]:
-    """What stands before lens and lamp, where that was varied."""
-    if not found.vary:
-        return []
-    choice = view.choice or own_choice(found.scene)
-    return of_choice(choice, exposure_time(found.scene, choice, found.hold))
 
 
 def _quantities(found: planner.Views) -> Table:
