@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from scenes.cameras.lens_modes import check_lens_modes
 from scenes.lights.filters import check_names
 from scenes.materials.textures import check_textures
 from scenes.measurands.features import Corner, check_feature
@@ -43,6 +44,7 @@ def check_consistent(scene: Scene) -> None:
     check_textures(scene.textures, scene.solid)
     check_uncertain(scene, scene.uncertain)
     scene.uncertainty.check_once(scene.uncertain)
+    check_lens_modes(scene.camera, scene.uncertainty.lens_modes)
     for i, setting in enumerate(scene.settings):
         scene.check_pose("sensor", setting.sensor, f"settings[{i}].sensor")
         scene.check_lights(setting.lights, f"settings[{i}].light")

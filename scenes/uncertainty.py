@@ -7,7 +7,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
 
+from scenes.cameras import lens_modes
 from scenes.cameras.covariance import ORDER, Covariance, of_document
+from scenes.cameras.lens_modes import LensMode
 from scenes.carriers import Carrier, HandEye, Stage, Turntable
 from scenes.errors import KIND
 from scenes.influences import AnyInfluence
@@ -24,6 +26,10 @@ def _or_sd(value: Any) -> Any:
 
 def _read(value: Any, info: ValidationInfo) -> Any:
     return value if value is None else of_document(value, (info.context or {}).get("directory", Path()))
+
+
+def _read_modes(value: Any, info: ValidationInfo) -> Any:
+    return lens_modes.of_file(value, (info.context or {}).get("directory", Path()))
 
 
 Deviation = Annotated[
@@ -90,6 +96,11 @@ class Uncertainty(Model):
         None
     )
     """Of a camera calibration: a file's name, relative to the scene's file, or names and matrix."""
+    lens_modes: Annotated[
+        tuple[LensMode, ...], BeforeValidator(_read_modes, json_schema_input_type=str | tuple[LensMode, ...])
+    ] = ()
+    """Of a splined lens: independent errors of variance 1, or the name of a JSON file with ``modes``, as `ice
+    calibrate-camera` writes them, relative to the scene's file."""
     reflectance: Deviation = Uncertain(half_width=0.1)
     """Of what each surface reflects, as a part of it: what light between faces, and so the correction of biases, is not
     sure of; known to within 10 % where not given [ratio]."""
@@ -142,7 +153,10 @@ class Uncertainty(Model):
         ValueError
             If not.
         """
+        if self.covariance is not None and self.lens_modes:
+            raise ValueError("uncertainty.covariance must be left out with lens_modes, got both")
         names = () if self.covariance is None else self.covariance.names
+        names = ("fx",) if self.lens_modes else names
         for each in numbers:
             twice = [name for name in _SAME.get(each.key, ()) if name in names]
             if twice:

@@ -13,11 +13,13 @@ from scipy.special import chdtrc
 from measure.boards.adjustment import Adjusted, adjust, begin
 from measure.boards.chessboard import Board
 from measure.boards.eccentricity import centred
+from measure.boards.lens_modes import lens_modes
 from measure.boards.parameters import SPLINED, CameraModel, Model, read_model, splined_control
 from measure.boards.splined import SplinedModel, fitted
 from measure.photo.lens import Intrinsics, SplinedIntrinsics
 from scenes import status
 from scenes.cameras.covariance import Covariance
+from scenes.cameras.lens_modes import LensMode
 from scenes.errors import InvalidInput
 
 FEWEST_BOARDS, FEWEST_CORNERS = 3, 8
@@ -112,12 +114,23 @@ class CameraCalibration:
         Raises
         ------
         InvalidInput
-            Of a splined lens, whose numbers a scene does not take for uncertain.
+            Of a splined lens, of which `lens_modes` tell.
         """
         if self.is_splined:
             raise InvalidInput(f"model must be one of coefficients for a covariance that scenes take, got {SPLINED}")
         even = (self.covariance + self.covariance.T) / 2
         return Covariance(names=self.names, matrix=tuple(tuple(map(float, row)) for row in even))
+
+    @property
+    def lens_modes(self) -> tuple[LensMode, ...]:
+        """How well a splined lens is known, as a scene's ``uncertainty.lens_modes`` (`measure.boards.lens_modes`).
+
+        Raises
+        ------
+        InvalidInput
+            Of a lens of coefficients, of which `for_budget` tells.
+        """
+        return lens_modes(self)
 
 
 def calibrate_camera(

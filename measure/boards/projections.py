@@ -65,11 +65,7 @@ class Difference:
 
 def projection_difference(first: Calibrated, second: Calibrated, margin: float = _MARGIN) -> Difference:
     """Compare two cameras, as `measure.calibrate_camera` gives them, over the image but ``margin`` of its sides."""
-    height, width = first.image_shape
-    x, y = (
-        np.linspace(margin * (n - 1), (1 - margin) * (n - 1), k) for n, k in zip((width, height), _GRID, strict=True)
-    )
-    places = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
+    places = grid_over(first.image_shape, margin)
     rays = rays_of(first, places)
     seen = np.isfinite(rays).all(1)
     rays = rays[seen]
@@ -82,6 +78,15 @@ def projection_difference(first: Calibrated, second: Calibrated, margin: float =
     taken = np.linalg.qr(_by_turn(there[both], by_points[both]))[0]
     rows = rows - taken @ (taken.T @ rows)
     return Difference(places[seen][both], image[both] - places[seen][both], rows @ rows.T, len(places))
+
+
+def grid_over(image_shape: tuple[int, int], margin: float) -> np.ndarray:
+    """Places (n, 2), px, over an image of (height, width) but a part of its sides."""
+    height, width = image_shape
+    x, y = (
+        np.linspace(margin * (n - 1), (1 - margin) * (n - 1), k) for n, k in zip((width, height), _GRID, strict=True)
+    )
+    return np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
 
 
 def rays_of(camera: Calibrated, places: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from imaging.pictures import Pictures
 from planner.budgeting.features import Features
 from planner.budgeting.products import products
 from planner.budgeting.sensitivities import sensitivities
-from planner.budgeting.sources import Source, sources
+from planner.budgeting.sources import LENS_MODE, Source, sources
 from planner.budgeting.terms import BIAS, EXPANSION, MODEL, TEMPERATURE, Term, terms
 from planner.prediction import Prediction, predict
 from planner.uncertainty.budget import Budget
@@ -209,9 +209,11 @@ def _with_own_terms(made: Budget, rows: list[Term]) -> Budget:
 
 def shared_inputs(scene: Scene, given: tuple[Source, ...]) -> tuple[EngineInput, ...]:
     """The sources as the engine's inputs: single ones first, then those of the calibration as a group."""
-    names = () if scene.uncertainty.covariance is None else scene.uncertainty.covariance.names
-    single = tuple(source.as_input for source in given if source.name not in names)
-    if not names:
+    told = scene.uncertainty.covariance
+    names = () if told is None else told.names
+    calibrated = tuple(each for each in given if each.name in names or each.name.startswith(LENS_MODE))
+    single = tuple(source.as_input for source in given if source not in calibrated)
+    if not calibrated:
         return single
-    correlated = tuple(source.as_input for source in given if source.name in names)
-    return (*single, Group(correlated, scene.uncertainty.covariance.correlation, CALIBRATION))
+    correlation = np.eye(len(calibrated)) if told is None else told.correlation
+    return (*single, Group(tuple(source.as_input for source in calibrated), correlation, CALIBRATION))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from planner.uncertainty.inputs import Input
 from scenes import Scene, Uncertain
 from scenes.board import PITCH
 from scenes.cameras import estimated
+from scenes.cameras.lens_modes import LensMode
+from scenes.cameras.splined import Splined
 from scenes.numbers import number_at, with_number
 from scenes.placement import COMPONENTS
 
@@ -26,6 +28,7 @@ _UNITS = {
     "flange_mm": "mm", "wavelength_nm": "nm", "line_time_us": "us", "shear": "px a row",
     "exposure": "levels", "sigma": "levels", "dark_level": "levels", "dsnu": "levels",
 }  # fmt: skip
+LENS_MODE = "lens mode"
 _LENGTHS = ("pitch", "distance", "look_at", "radius", "aperture_radius", "focus", "offset", "height", "half_side")
 
 
@@ -79,7 +82,7 @@ class Source(Believed):
 
 def sources(scene: Scene) -> tuple[Source, ...]:
     """All inputs that move what a picture shows; temperature, rounding and the like are not among them."""
-    of_camera = (*_calibrated(scene), *_estimated(scene))
+    of_camera = (*_calibrated(scene), *_modes(scene), *_estimated(scene))
     return (*_numbers(scene), *_poses(scene), *_carried(scene), *of_camera, *_influences(scene))
 
 
@@ -172,6 +175,25 @@ def _calibrated(scene: Scene) -> Iterator[Source]:
             key = f"camera.lens.distortion[{place}]"
             move = _number_moved(key)
             yield Source(name, number_at(scene, key), told, "", "geometry", 1e-2, move)
+
+
+def _modes(scene: Scene) -> Iterator[Source]:
+    """Errors of a splined lens."""
+    for number, mode in enumerate(scene.uncertainty.lens_modes, 1):
+        move = _lens_moved(mode, scene.camera.focal_px)
+        yield Source(f"{LENS_MODE} {number}", 0.0, Uncertain(sd=1.0), "", "geometry", 1.0, move)
+
+
+def _lens_moved(mode: LensMode, focal: float) -> Callable[[Station, float], Station]:
+    stretched = _stretched(focal, (0, 1))
+
+    def moved(station: Station, step: float) -> Station:
+        camera = station.scene.camera
+        lens = mode.moved(cast("Splined", camera.lens), step)
+        scene = station.scene.tried(camera=camera.tried(lens=lens))
+        return stretched(replace(station, scene=scene), step * mode.focal_px)
+
+    return moved
 
 
 def _estimated(scene: Scene) -> Iterator[Source]:

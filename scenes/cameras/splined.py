@@ -18,7 +18,7 @@ DEGREE = 3
 Plane = Literal["normalised", "stereographic"]
 _Place = Annotated[float, Field(ge=-100, le=100)]
 _Shift = Annotated[float, Field(ge=-100, le=100)]
-_Rows = tuple[tuple[_Shift, ...], ...]
+Rows = tuple[tuple[_Shift, ...], ...]
 
 
 @LENSES.add("splined")
@@ -43,10 +43,10 @@ class Splined(LensModel):
     """Over which plane: that of a pinhole's image, or, for wide lenses, its stereographic projection."""
     extent: tuple[_Place, _Place, _Place, _Place]
     """Least x and y and largest x and y of the plane, where the lens is known, focal lengths."""
-    right: _Rows
+    right: Rows
     """Control points of the displacement to the right, row by row from the least y, 4 or more a row and column; the
     outermost lie one interval beyond the extent. Focal lengths."""
-    down: _Rows
+    down: Rows
     """The same of the displacement downwards."""
 
     @model_validator(mode="after")
@@ -83,7 +83,7 @@ class Splined(LensModel):
 
 
 @lru_cache(maxsize=16)
-def _splines(extent: tuple[float, ...], right: _Rows, down: _Rows) -> NdBSpline:
+def _splines(extent: tuple[float, ...], right: Rows, down: Rows) -> NdBSpline:
     """Both displacements over the plane; NaN beyond the extent."""
     from scipy.interpolate import NdBSpline  # slow to load, and rarely needed
 

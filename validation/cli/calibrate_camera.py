@@ -87,9 +87,8 @@ def calibrate_camera_command(given: Options) -> None:
 
     --next proposes where to hold the board for the next photograph, and says what that would leave of U.
 
-    -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance (not of a splined lens:
-    a scene does not take its numbers for uncertain). Exit status 1 if the
-    boards do not determine the focal length.
+    -o writes the lens, and beside it LENS_covariance.json for a scene's uncertainty.covariance, of a splined lens
+    LENS_modes.json for its uncertainty.lens_modes. Exit status 1 if the boards do not determine the focal length.
     """
     printed = _checked(given)
     import measure
@@ -104,7 +103,7 @@ def calibrate_camera_command(given: Options) -> None:
         raise InvalidInput(f"--next must be used without --model {given.model}, got {given.following!r}")
     if not splined:
         read_model(given.model)
-    scene, beside = given.scene, None if splined else given.output and _beside(given.output)
+    scene, beside = given.scene, given.output and _beside(given.output, splined)
     camera = None if scene is None else scenes.load(scene).camera
     with progress("corners") as shown:
         size = camera and Size(camera.height, camera.width, scene)
@@ -202,9 +201,8 @@ def _write_files(found, seen, output: Path | None, residuals: Path | None) -> li
     if output is not None:
         written.append(output)
         _write(output, camera_table.lens_file(found))
-        if not found.is_splined:
-            written.append(_beside(output))
-            _write(_beside(output), camera_table.covariance_file(found))
+        written.append(_beside(output, found.is_splined))
+        _write(written[-1], camera_table.uncertainty_file(found))
     if residuals is not None:
         from validation.report import camera_figure  # matplotlib takes half a second to load
 
@@ -236,8 +234,8 @@ def _shape(text: str | None) -> tuple[int, int] | None:
         raise InvalidInput(f"--shape must be columns x rows of inner corners as 9x6, got {text!r}") from None
 
 
-def _beside(path: Path) -> Path:
-    return path.with_name(f"{path.stem}_covariance.json")
+def _beside(path: Path, is_splined: bool) -> Path:
+    return path.with_name(f"{path.stem}_{'modes' if is_splined else 'covariance'}.json")
 
 
 def _write(path: Path, text: str) -> None:

@@ -136,8 +136,11 @@ def _spline_lines(lens: SplinedIntrinsics) -> list[str]:
     return [f"{key} = {json.dumps(value)}" for key, value in told.items()]
 
 
-def covariance_file(found: CameraCalibration) -> str:
-    """JSON as ``uncertainty.covariance`` reads it."""
+def uncertainty_file(found: CameraCalibration) -> str:
+    """JSON as ``uncertainty.covariance`` reads it, of a splined lens as ``uncertainty.lens_modes`` does."""
+    _check_finite(found)
+    if found.is_splined:
+        return dumps({"modes": [mode.model_dump() for mode in found.lens_modes]}) + "\n"
     return dumps(_covariance(found)) + "\n"
 
 
@@ -161,8 +164,9 @@ def scene_lines(found: CameraCalibration, scene: str, beside: Path | None) -> st
         )
     lens = found.lens
     if isinstance(lens, SplinedIntrinsics):
-        unknown = "# How well this lens is known, a scene does not take: U of its values is without it."
-        return "\n".join(["[camera]", f"focal_px = {lens.fx!r}", unknown, "", "[camera.lens]", *_spline_lines(lens)])
+        lines = ["[camera]", f"focal_px = {lens.fx!r}", "", "[camera.lens]", *_spline_lines(lens), "", "[uncertainty]"]
+        unsaid = "# lens_modes: how well this lens is known, in the file that -o FILE writes beside it."
+        return "\n".join([*lines, f"lens_modes = {json.dumps(beside.name)}" if beside else unsaid])
     off = lens.cx - (width - 1) / 2, lens.cy - (height - 1) / 2
     told = ", ".join(f"{key} = {json.dumps(value)}" for key, value in _covariance(found).items())
     given = json.dumps(beside.name) if beside else f"{{ {told} }}"
@@ -233,8 +237,12 @@ def _strong(found: CameraCalibration) -> list[tuple[str, str, float]]:
     return [pair for pair in pairs if abs(pair[2]) > _STRONG] or pairs[:1]
 
 
-def _covariance(found: CameraCalibration) -> dict[str, Any]:
+def _check_finite(found: CameraCalibration) -> None:
     if not np.isfinite(found.covariance).all():
         raise InvalidInput("BOARD must determine a camera, got boards that leave its covariance infinite")
+
+
+def _covariance(found: CameraCalibration) -> dict[str, Any]:
+    _check_finite(found)
     told = found.for_budget
     return {"names": list(told.names), "matrix": [list(row) for row in told.matrix]}
