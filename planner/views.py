@@ -90,9 +90,6 @@ def plan_views(
     vary, hold
         As of `plan`: polarisers, lamp and filter are chosen for each picture (`View.choice`), angles first every 30
         degrees; `Views.own` are the best sets with the scene's own. Not with ``share``.
-    vary, hold
-        As of `plan`: each picture has polarisers, lamp and filter of its own (`View.choice`); `Views.own` are the best
-        pictures with the scene's own. Nothing can be shared then.
 
     Raises
     ------
