@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import numpy as np
 import typer
@@ -22,9 +24,13 @@ def kill(
     renders: Annotated[int, typer.Option(help="Images a setting.")] = 1000,
     seed: Annotated[int, typer.Option(help="Of the run, and of the moments.")] = 1,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    dask: Annotated[int, typer.Option(help="Workers of a Dask cluster here, one of which is killed each time.")] = 0,
     out: Annotated[Path, typer.Option(metavar="DIR", help="For the two run directories.")] = Path("runs/proof"),
 ) -> None:
-    """Run once unbroken, once killed with SIGKILL at random moments and continued; compare every stored number."""
+    """Run once unbroken, once killed with SIGKILL at random moments and continued; compare every stored number.
+
+    On a Dask cluster the run goes on, and workers are killed.
+    """
     directories = out / "unbroken", out / "killed"
     commands = [_command(scene, renders, seed, workers, directory) for directory in directories]
     for file in (file for directory in directories for file in directory.glob("run.*")):
@@ -33,6 +39,9 @@ def kill(
     print(f"unbroken: {whole:.1f} s, first result after {first:.1f} s")
     rng, before, landed = np.random.default_rng(seed), 0, 0
     quota = _images(directories[0]) / (times + 1)
+    if dask:
+        landed = _on_cluster(commands[1], directories[1], dask, quota * (np.arange(times) + rng.uniform(size=times)))
+        _say(directories, landed, times, "workers")
     for number in range(times):
         # a random moment, or a random number of results if that comes first, so that the run is not over too soon
         delay, enough = first * rng.uniform(0.5, 2.0), before + quota * rng.uniform()
@@ -43,9 +52,37 @@ def kill(
         )
         before, landed = images, landed + (not ended)
     _run(commands[1])
+    _say(directories, landed, times, "a running process")
+
+
+def _say(directories: tuple[Path, Path], landed: int, times: int, hit: str) -> NoReturn:
     equal, what = same(*directories)
-    print(f"{landed} of {times} kills hit a running process; {what}")
+    print(f"{landed} of {times} kills hit {hit}; {what}")
     raise typer.Exit(0 if equal and landed == times else 1)
+
+
+def _on_cluster(command: list[str], directory: Path, workers: int, moments: np.ndarray) -> int:
+    """Run upon Dask workers of this machine, the next of which is killed after each of some numbers of images; how many
+    were."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=50
+    ) as cluster:
+        process, landed = (
+            subprocess.Popen([*command, "--dask", cluster.scheduler_address], stdout=subprocess.DEVNULL),
+            0,
+        )
+        nannies = list(cluster.workers.values())
+        while process.poll() is None:
+            images = _images(directory)
+            if landed < len(moments) and images > moments[landed]:
+                os.kill(nannies[landed % workers].pid, signal.SIGKILL)
+                landed += 1
+                print(f"kill {landed}: a worker, after {images} images", flush=True)
+            time.sleep(0.05)
+    _check(process.returncode)
+    return landed
 
 
 def same(first: Path, second: Path) -> tuple[bool, str]:
