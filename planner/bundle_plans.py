@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,12 +21,14 @@ from planner.search.grid import Grid
 from planner.search.network_pool import NetworkPool
 from planner.search.networks import best_of_all, best_sets
 from planner.search.objective import DEFAULT_OVER, Aim, Over, Report, SearchProblem
+from planner.search.pool import settings_of
 from planner.views import MOST_VIEWS
 from scenes import InvalidInput, Picture, Scene, status
 from scenes.results import Shown, finite, poses
 
 _MOST_SENSORS = 4000  # that a grid may have
 _COUNTS = {status.OK: 1.0, status.CLUTTER: DEAREST}  # times a variance, in what is minimised
+_MOST_COMBINATIONS = 256  # of places of several lights
 _LOOKED = 8  # settings for each picture of a set that are ray-traced at most
 
 
@@ -49,7 +51,7 @@ class BundleSet:
         The same of the best of all sets of K of the settings that were looked at; None where they are too many.
     bound : float or None
         What no K pictures of the grid can stay below, if a glance is right; None where no pictures, however many, tell
-        every quantity, or K do not.
+        every quantity, or K do not, and of several free lights.
     impossible : bool
         Whether no K pictures of the grid tell every quantity, by a glance at all sets of them.
     hard : tuple of str
@@ -145,7 +147,7 @@ class BundlePlan(Shown):
             for row, U in zip(found.prediction.as_rows(), found.U, strict=True):
                 about = {"scene": row["scene"], "pictures": row["pictures"], "picture": number}
                 told = {name: row[name] for name in ("name", "unit", "sigma", "u", "status")}
-                yield about | poses(picture.sensor, picture.lights[0]) | told | {"U": finite(U)}
+                yield about | poses(picture.sensor, picture.free_lights) | told | {"U": finite(U)}
 
     def _line(self) -> str:
         last = self.sets[-1]
@@ -176,9 +178,10 @@ def plan_bundle(
     noise, and by all that is not known before of part, sensors and camera.
 
     Each setting of a grid is a matrix, its information of what pictures share (`planner.search.networks`); of each
-    sensor two lights are candidates. Sets are chosen greedily with exchange, each picture that is chosen gets the best
-    of all lights beside the others and is ray-traced (clutter, light between surfaces), and sets are chosen again,
-    until all that is chosen has been looked at. What is returned is predicted by `predict_bundle`.
+    sensor two lights are candidates, of several free lights two of the places that are best from any sensor for all
+    quantities or for one (without a bound). Sets are chosen greedily with exchange, each picture that is chosen gets
+    the best of all lights beside the others and is ray-traced (clutter, light between surfaces), and sets are chosen
+    again, until all that is chosen has been looked at. What is returned is predicted by `predict_bundle`.
 
     Parameters
     ----------
@@ -208,8 +211,6 @@ def plan_bundle(
         raise InvalidInput(f"views must be 1 to {MOST_VIEWS}, got {count}")
     if model not in ("calibrated", "paper"):
         raise InvalidInput(f"model must be one of calibrated, paper for several pictures, got {model!r}")
-    if len(scene.lights) != 1 or not scene.free:
-        raise InvalidInput(f"lights must be one that is free, for several pictures, got {len(scene.lights)} light(s)")
     freedom, report = Freedom(sensors, shape, axes, cameras), report or (lambda *_: None)
     problem = SearchProblem(scene, model, Aim.of(scene.quantities, "object", over),
                             (constraints or Constraints()).on_side_of(scene))  # fmt: skip
@@ -217,13 +218,15 @@ def plan_bundle(
     grid = Grid.of(scene, problem.constraints, step, sensor, light)
     if len(grid.sensors) > _MOST_SENSORS:
         raise InvalidInput(f"step must leave at most {_MOST_SENSORS} sensors, got {step:g} ({len(grid.sensors)})")
+    if is_mixed := len(scene.free) > 1 and not grid.held[1]:
+        grid = replace(grid, lights=_combinations(problem, grid, report))
     pool = NetworkPool(problem, freedom, grid, report)
     if not pool.poses:
         raise InvalidInput("constraints must leave a setting that can measure, got none")
     _look(pool, count, report)
-    sets = _sets(pool, count)
+    sets = _sets(pool, count, bounded=not is_mixed)
     pairs = len(grid.sensors) * len(grid.lights)
-    return BundlePlan(scene, over, model, sensors, sets, pairs, len(pool.looked), _guarantee(step))
+    return BundlePlan(scene, over, model, sensors, sets, pairs, len(pool.looked), _guarantee(step, is_mixed))
 
 
 def _look(pool: NetworkPool, count: int, report: Report) -> None:
@@ -241,7 +244,20 @@ def _look(pool: NetworkPool, count: int, report: Report) -> None:
             report("looking closely", len(pool.looked), most)
 
 
-def _sets(pool: NetworkPool, count: int) -> tuple[BundleSet, ...]:
+def _combinations(problem: SearchProblem, grid: Grid, report: Report) -> np.ndarray:
+    """Poses of several free lights, (L, 2 F): those that are best from a sensor of the grid for all quantities or for
+    one, of them those that tell most of one."""
+    poses, told = settings_of(problem, grid, report)
+    shares = (told / np.maximum(told.max(0), np.finfo(float).tiny)).max(1)
+    order = np.argsort(-shares, kind="stable")
+    lights = poses[order[shares[order] > 0], 2:]
+    if not len(lights):
+        raise InvalidInput("constraints must leave a setting that can measure, got none")
+    first = np.sort(np.unique(lights, axis=0, return_index=True)[1])
+    return lights[first[:_MOST_COMBINATIONS]]
+
+
+def _sets(pool: NetworkPool, count: int, *, bounded: bool) -> tuple[BundleSet, ...]:
     rows, known, firm = pool.known()
     made, quantities, aim = [], pool.problem.scene.quantities, known.aim
     for size, members in enumerate(best_sets(known, count), 1):
@@ -251,8 +267,8 @@ def _sets(pool: NetworkPool, count: int) -> tuple[BundleSet, ...]:
         told = counts > 0
         steady = firm.variances(np.array(members)) <= STEEPEST * known.variances(np.array(members))
         every, near = best_of_all(pool.most, size), best_of_all(known, size)
-        impossible = every is not None and every[0] > 0
-        bound = every[1] if every else pool.most.relaxed(size)[0]
+        impossible = bounded and every is not None and every[0] > 0
+        bound = math.inf if not bounded else every[1] if every else pool.most.relaxed(size)[0]
         made.append(
             BundleSet(
                 pictures=pictures,
@@ -268,8 +284,8 @@ def _sets(pool: NetworkPool, count: int) -> tuple[BundleSet, ...]:
     return tuple(made)
 
 
-def _guarantee(step: float) -> str:
-    return (
-        "no exchange of one picture for another that was looked at makes a set better; of all pairs of the"
-        f" {step:g} degree grid only the bound is known"
-    )
+def _guarantee(step: float, is_mixed: bool) -> str:
+    rest = f"of all pairs of the {step:g} degree grid only the bound is known"
+    if is_mixed:
+        rest = "where else several lights might stand is not known"
+    return f"no exchange of one picture for another that was looked at makes a set better; {rest}"

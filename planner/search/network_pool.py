@@ -17,7 +17,7 @@ from imaging.pictures import Pictures
 from planner.bundles import states_of
 from planner.ranks import feature_ranks
 from planner.search.candidates import SettingUp
-from planner.search.grid import Grid
+from planner.search.grid import Grid, as_poses
 from planner.search.networks import Network, of_one, of_shared, scale_of
 from planner.search.objective import Report, SearchProblem
 from planner.search.sets import better
@@ -102,7 +102,7 @@ class NetworkPool:
     Attributes
     ----------
     poses : list of tuple of ndarray
-        Sensor (2,) and light (2,), degrees, to the digits at which they are set up.
+        Sensor (2,) and free lights (2 F,), degrees, to the digits at which they are set up.
     looked : dict of int to Picture
         Rows that were looked at closely.
     most : Network
@@ -223,7 +223,7 @@ class NetworkPool:
         return self._numbers[s, light]
 
     def _picture(self, sensor: np.ndarray, light: np.ndarray) -> Picture:
-        return Picture.of(self.problem.scene, tuple(sensor.tolist()), tuple(light.tolist()))
+        return Picture.of(self.problem.scene, tuple(sensor.tolist()), as_poses(light))
 
 
 def _whites(bundle: Bundle, covariance: np.ndarray, shown: np.ndarray) -> np.ndarray:

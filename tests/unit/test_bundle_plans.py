@@ -9,7 +9,7 @@ import render
 import scenes
 from imaging.blurred.whole import image
 from planner.budgeting.bundles import budgets_of
-from scenes import InvalidInput
+from scenes import InvalidInput, Pose
 from tests import placements as parts
 from tests.bundles import UNSURE
 from tests.unit.test_space_kinds import wedge  # noqa: F401 (a fixture)
@@ -110,6 +110,32 @@ def test_without_a_scale_nothing_is_planned(tmp_path):
     assert [each.is_plan for each in found.sets] == [False, False]
     assert found.sets[1].lost == ("length", "slope")
     assert (found.sets[1].bound, found.sets[1].impossible) == (None, True)
+
+
+def test_each_picture_has_places_of_all_free_lights():
+    """No worse than with the lights where each sensor's first picture would have them all alike; without a bound."""
+    scene = scenes.load("two_lights")
+    found = planner.plan_bundle(scene, 2, "known", step_deg=30)
+    one, two = found.sets
+    assert (one.is_plan, two.is_plan, two.bound) == (False, True, None)
+    assert [len(picture.free_lights) for picture in two.pictures] == [2, 2]
+    told = planner.predict_bundle(two.pictures, "known")
+    assert told.u == pytest.approx(two.prediction.u, rel=1e-9)
+    for lights in {picture.free_lights for picture in two.pictures}:
+        alike = [scenes.Picture.of(scene, picture.sensor, lights) for picture in two.pictures]
+        other = planner.predict_bundle(alike, "known")
+        worst = np.where(np.array(other.status) == "ok", other.u, np.inf).max()
+        assert two.prediction.u.max() <= worst * (1 + 1e-9)
+    assert {"lights"} <= set(found.as_rows()[-1])
+
+
+def test_lights_that_stand_still_are_as_the_scene_says():
+    scene = scenes.load("two_lights")
+    lights = [{"distance": 100, "mount": "fixed", "pose": pose} for pose in ([75, 280], [45, 276])]
+    fixed = scene.with_(lights=lights, settings=[{"sensor": [60, 277]}])
+    found = planner.plan_bundle(fixed, 2, "known", step_deg=30)
+    assert found.sets[1].is_plan
+    assert {picture.lights for picture in found.sets[1].pictures} == {(Pose(75, 280), Pose(45, 276))}
 
 
 @pytest.mark.parametrize(

@@ -72,11 +72,17 @@ def facts(found: planner.BundlePlan, seconds: float) -> dict[str, Any]:
     })  # fmt: skip
 
 
+def _light(picture: scenes.Picture) -> tuple[Any, ...]:
+    """The free light's pose, or all of them."""
+    free = picture.free_lights
+    return scenes.pairs(free[0] if len(free) == 1 else free)
+
+
 def _set(each: planner.BundleSet) -> dict[str, Any]:
     told = each.prediction
     return {
         "count": len(each.pictures),
-        "poses": [{"sensor": list(one.sensor), "light": list(one.lights[0])} for one in each.pictures],
+        "poses": [{"sensor": list(one.sensor), "light": _light(one)} for one in each.pictures],
         **picked(each, "is_plan", "minimised", "worst_ratio", "limiting"),
         "lost": list(each.lost),
         "hard": list(each.hard),

@@ -69,7 +69,7 @@ def _poses(found: planner.BundlePlan) -> Table:
     for each in filter(lambda each: each.is_plan, found.sets):
         for number, picture in enumerate(each.pictures, 1):
             first = str(len(each.pictures)) if number == 1 else ""
-            table.add_row(first, f"no. {number}", _pose(picture.sensor), _pose(picture.lights[0]))
+            table.add_row(first, f"no. {number}", _pose(picture.sensor), _pose(picture.free_lights))
     return table
 
 
