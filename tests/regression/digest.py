@@ -26,6 +26,7 @@ _DEEP = 6
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _ELSEWHERE = re.compile(r"(?:/[^\s/'\"<>:,;()\[\]]+)+|\b[0-9a-f]{8,}\b|\b\d+\.\d+\.\d+\b")  # paths, hashes, versions
 _WEIGHTS = np.cos(0.37 * np.arange(_MOST) + 1)
+_LATER = ("lens_modes",)  # fields since digests were stored: as of a scene that does not say them they are not there
 _SHARES = tuple(0.5 + (0.618034 * (j + 1)) % 1 for j in range(_WIDE))
 
 
@@ -84,7 +85,8 @@ class Digester:
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
             names = [each.name for each in dataclasses.fields(value)]
         elif isinstance(value, pydantic.BaseModel):
-            names = list(type(value).model_fields)
+            fields = type(value).model_fields
+            names = [name for name in fields if name not in _LATER or getattr(value, name) != fields[name].default]
         elif sparse.issparse(value):
             value = value.tocsr()
             names = ["shape", "data", "indices", "indptr"]
