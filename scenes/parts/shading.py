@@ -151,9 +151,8 @@ def _within(solid: Solid, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
         better = np.flatnonzero(least > inside[some])
         some = some[better]
         inside[some], triangle[some], share[:, some] = least[better], which[better], shares[:, better]
-    corners = corner_normals(solid)
-    share = np.maximum(share, 0)[..., None]
-    found = sum(share[k] * corners[:, k].take(triangle, 0) for k in range(3))
+    corners, share = corner_normals(solid).take(triangle, 0), np.maximum(share, 0)[..., None]
+    found = sum(share[k] * corners[:, k] for k in range(3))
     size = length(found)[:, None]
     return np.where(size > 0, found / np.where(size > 0, size, 1.0), solid.normals.take(faces, 0))
 
@@ -177,6 +176,6 @@ def _slopes(solid: Solid) -> np.ndarray:
 
 def _shares(solid: Solid, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Barycentric coordinates (3, n) of points (n, 3) in triangles (n,); NaN in those of no area."""
-    away, slopes = points - solid.triangles[:, 0].take(triangles, 0), _slopes(solid)
-    second, third = (product(slopes[:, k].take(triangles, 0), away) for k in (0, 1))
+    away, slopes = points - solid.triangles.take(triangles, 0)[:, 0], _slopes(solid).take(triangles, 0)
+    second, third = (product(slopes[:, k], away) for k in (0, 1))
     return np.stack([1 - second - third, second, third])

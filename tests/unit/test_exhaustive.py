@@ -68,6 +68,7 @@ def test_pair_by_pair_the_least_of_each_sensor_is_told():
                 yield part, SimpleNamespace(values=levels[part], cut=cut[part]), allowed[part]
 
         with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(exhaustive, "_seeing", lambda scene, sensors: np.ones(len(sensors), bool))
             patch.setattr(exhaustive, "minimised", lambda errors, aim: errors.values)
             patch.setattr(exhaustive, "cut_off", lambda errors, scene: errors.cut)
             problem = SimpleNamespace(table=table, objective=None, scene=None)
