@@ -24,6 +24,7 @@ except ImportError:
 Own = tuple[int, ...] | np.ndarray
 """Faces that no ray, or rays (n, k) each, cannot meet."""
 
+_AT_ONCE = 1 << 14  # rays
 _CHUNK = 50_000  # ray-triangle pairs at a time
 _BUNDLE = 1024  # rays for which triangles that none of them comes near are left out together
 _MANY, _FEW = 2000, 64  # triangles from which on rays are sorted, and bundles of them divided into some of so few
@@ -63,7 +64,7 @@ def first_face(
     shape = origins.shape[:-1]
     rays = np.reshape(origins, (-1, 3)), np.reshape(vectors, (-1, 3))
     own = own.reshape(-1, own.shape[-1]) if isinstance(own, np.ndarray) else own
-    face, t = (by_embree if has_embree() else by_trial)(_plates(solid, margin), *rays, own)
+    face, t = (_in_parts if has_embree() else by_trial)(_plates(solid, margin), *rays, own)
     return face.reshape(shape), t.reshape(shape)
 
 
@@ -95,6 +96,15 @@ def _by_trial_of_each(
     for number, faces in enumerate(different.tolist()):
         rays = np.flatnonzero(which == number)
         face[rays], t[rays] = by_trial(plates, origins[rays], vectors[rays], tuple(faces))
+    return face, t
+
+
+def _in_parts(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own) -> tuple[np.ndarray, np.ndarray]:
+    """`by_embree` of so few rays at a time that what is made of them stays near to the processor."""
+    face, t = np.empty(len(origins), int), np.empty(len(origins))
+    for at in range(0, len(origins), _AT_ONCE):
+        part = slice(at, at + _AT_ONCE)
+        face[part], t[part] = by_embree(plates, origins[part], vectors[part], _of_rays(own, part))
     return face, t
 
 
@@ -138,7 +148,7 @@ def by_embree(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own
     return face, t
 
 
-def _of_rays(own: Own, rays: np.ndarray) -> Own:
+def _of_rays(own: Own, rays: np.ndarray | slice) -> Own:
     """Faces that some of the rays cannot meet."""
     return own[rays] if isinstance(own, np.ndarray) else own
 
