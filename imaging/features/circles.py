@@ -188,7 +188,8 @@ def _weighted(weights: np.ndarray, design: np.ndarray) -> np.ndarray:
     """Sums of the products of two columns of designs (..., n, p) over the places, weighted (..., n): (..., p, p)."""
     parts = design.shape[-1]
     products = (design[..., :, None] * design[..., None, :]).reshape(*design.shape[:-1], parts**2)
-    return (weights[..., None, :] @ products).reshape(*weights.shape[:-1], parts, parts)
+    found = (weights[..., None, :] @ products)[..., 0, :]
+    return found.reshape(*found.shape[:-1], parts, parts)
 
 
 def _at_ends(share: np.ndarray, variance: np.ndarray, design: np.ndarray, arc: np.ndarray) -> np.ndarray:

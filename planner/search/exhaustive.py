@@ -163,14 +163,15 @@ def _seeing(scene: Scene, sensors: np.ndarray) -> np.ndarray:
     """Which sensors (S, 2) see something of every edge and circle that is needed, bool (S,): the others measure with no
     light at all."""
     pictures = Pictures.of(scene, sensors)
-    known = measurands(pictures)
-    needed = known.depends().any(0)
-    edges = len(known.view.names)
-    seen = (known.view.visible | ~needed[:edges]).all(-1)
-    for name, asked in zip(known.circles, needed[edges:], strict=True):
-        circle = scene.solid.round(name)
-        if asked and isinstance(circle, Circle):
-            seen &= seen_along(pictures, circle, circle.angles(RIM_POINTS)).any(-1)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        known = measurands(pictures)
+        needed = known.depends().any(0)
+        edges = len(known.view.names)
+        seen = (known.view.visible | ~needed[:edges]).all(-1)
+        for name, asked in zip(known.circles, needed[edges:], strict=True):
+            circle = scene.solid.round(name)
+            if asked and isinstance(circle, Circle):
+                seen &= seen_along(pictures, circle, circle.angles(RIM_POINTS)).any(-1)
     return seen
 
 
