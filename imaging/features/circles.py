@@ -142,7 +142,7 @@ def _off(squared: np.ndarray, off_ends: np.ndarray | None) -> np.ndarray:
 
 def fisher_circle(circle: RimImage, weights: np.ndarray, counted: np.ndarray | None) -> np.ndarray:
     """Covariance of the three parameters from independent points of the given inverse variances (..., n), unit^2."""
-    information = np.einsum("...n,...ni,...nj->...ij", weights, circle.design, circle.design)
+    information = _weighted(weights, circle.design)
     enough = circle.left >= LEAST_SEEN
     return _covariance(information, enough if counted is None else enough & (counted.sum(-1) > 3))
 
@@ -167,11 +167,12 @@ def calibrated_circle(
     ratio = circle.squared / circle.noise_variance
     share = np.where(ratio >= weakest, circle.share, 0.0)
     information, along = (
-        np.einsum("...n,...ni,...nj->...ij", np.where(share > 0, weight * ratio, 0.0), circle.design, circle.design)
+        _weighted(np.where(share > 0, weight * ratio, 0.0), circle.design)
         for weight in (share * circle.arc, kappa2 * share**2 * circle.arc)
     )
-    error = np.sqrt(np.where(share > 0, kappa2 * ratio, 0.0))[..., None] * circle.design
-    scatter = 2 * np.sqrt(np.pi) * scale * along - 2 * scale**2 * _at_ends(share, error, circle.arc / scale)
+    variance = np.where(share > 0, kappa2 * ratio, 0.0)
+    ends = _at_ends(share, variance, circle.design, circle.arc / scale)
+    scatter = 2 * np.sqrt(np.pi) * scale * along - 2 * scale**2 * ends
     enough = circle.turn * (share >= HALF).mean(-1) >= LEAST_SEEN
     inverse = _covariance(information, enough & _positive(scatter))
     good = np.isfinite(inverse).all((-1, -2))[..., None, None]
@@ -183,18 +184,28 @@ def calibrated_circle(
     return np.where(good, known @ scatter @ known, inverse)
 
 
-def _at_ends(share: np.ndarray, error: np.ndarray, arc: np.ndarray) -> np.ndarray:
-    """What correlation lacks where points begin and cease to count, (..., p, p), for errors (..., n, p) of points.
+def _weighted(weights: np.ndarray, design: np.ndarray) -> np.ndarray:
+    """Sums of the products of two columns of designs (..., n, p) over the places, weighted (..., n): (..., p, p)."""
+    parts = design.shape[-1]
+    products = (design[..., :, None] * design[..., None, :]).reshape(*design.shape[:-1], parts**2)
+    found = (weights[..., None, :] @ products)[..., 0, :]
+    return found.reshape(*found.shape[:-1], parts, parts)
+
+
+def _at_ends(share: np.ndarray, variance: np.ndarray, design: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    """What correlation lacks where points begin and cease to count, (..., p, p), for errors of points of variances
+    (..., n) that move what a design (..., n, p) says.
 
     A share w(x) that changes in steps d_k at places x_k has, for errors that correlate as exp(-u^2 / 4), a double
     integral of 2 sqrt(pi) times that of w^2, less 2 sum d_k d_l f(x_k - x_l), f(u) = exp(-u^2 / 4) - sqrt(pi) u / 2
     erfc(u / 2): 1 for each hard end, as good as nothing for one that is long. ``arc`` (..., n) is in smoothing scales.
     """
-    rise = np.roll(share, -1, -1) - share
-    steps = rise[..., None] * np.where(rise[..., None] > 0, np.roll(error, -1, -2), error)
-    found = np.einsum("...ni,...nj->...ij", steps, steps)
+    rise = np.roll(share, -1, -1) - share  # of a rise the point counts at which it ends
+    found = _weighted((np.minimum(rise, 0.0) ** 2 + np.roll(np.maximum(rise, 0.0), 1, -1) ** 2) * variance, design)
     if not ((share > 0) & (share < 1)).any():
         return found
+    error = np.sqrt(variance)[..., None] * design
+    steps = rise[..., None] * np.where(rise[..., None] > 0, np.roll(error, -1, -2), error)
     apart = np.broadcast_to(arc, share.shape)
     for k in range(1, min(int(_FAR / max(apart.min(), 1e-300)), share.shape[-1] // 2) + 1):
         half = k * apart / 2
@@ -208,9 +219,9 @@ def _positive(matrices: np.ndarray) -> np.ndarray:
     """Which symmetric matrices (..., p, p) are positive definite by more than rounding, bool, shape (...)."""
     size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=-2, axis2=-1), 0.0))
     good = np.isfinite(matrices).all((-1, -2)) & (size > 0).all(-1)
-    size = np.where(good[..., None], size, 1.0)
-    scaled = np.where(good[..., None, None], matrices / (size[..., None] * size[..., None, :]), np.eye(size.shape[-1]))
-    return good & (np.linalg.eigvalsh(scaled)[..., 0] > 1e-10)
+    found, size = np.zeros(good.shape, bool), size[good]
+    found[good] = np.linalg.eigvalsh(matrices[good] / (size[..., None] * size[..., None, :]))[..., 0] > 1e-10
+    return found
 
 
 def _covariance(information: np.ndarray, enough: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ _LOOKED, _RIVAL = 13, 0.5  # places across the search window, and how steep anot
 _AT = 1e-6  # of the way to the next place: there is the place itself
 _MOST = 12  # times `RIM_POINTS`
 _SPACING = 0.7  # smoothing scales between places, while there are not so many
-_AT_ONCE = 1 << 17  # rays
+_AT_ONCE = 1 << 15  # rays
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def _look(pictures: Pictures, circle: Circle) -> RimLook:
     where = outline_beside(pictures, circle, places, normals, width[:, None] * _BESIDE) / width[:, None]
     levels = _levels(pictures, circle, angle, places, normals, width)
     alone = zero_of_steps(where, _SHARES)
-    steps = _steps(levels)
+    steps = _steps(levels, where)
     crossing, slope = _zero(steps, where, alone)
     sides = levels[:, _MIDDLE, [_CELLS - 1, _CELLS]].T
     noise = sensor.recorded(scene.noise, scene.noise.dark_level + sides).noise_variance
@@ -263,17 +263,18 @@ def _looked_at(pictures: Pictures, points: np.ndarray) -> np.ndarray:
     return found
 
 
-def _steps(levels: np.ndarray) -> np.ndarray:
-    """From each cell to the next (n, J, 2 cells - 1), as lines of levels (n, J, 2 cells) beside each other count."""
-    return np.diff(levels) * _SHARES[:, None]
+def _steps(levels: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """From each cell to the next (n, J, 2 cells - 1), as lines of levels (n, J, 2 cells) beside each other count, times
+    what of a Gaussian about outlines at ``where`` (n, J) is the same wherever it stands (`_second`)."""
+    return np.diff(levels) * (_SHARES[:, None] * np.exp(-_ENDS * (_ENDS / 2 + where[..., None])))
 
 
 def _zero(steps: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Zero crossing of the second derivative of steps (n, J, 2 cells - 1) about outlines at ``where`` (n, J), in
-    standard deviations, and the contrast of a lone step that has its slope there."""
+    """Zero crossing of the second derivative of `_steps` about outlines at ``where`` (n, J), in standard deviations,
+    and the contrast of a lone step that has its slope there."""
     found = start.copy()
     for _ in range(_STEPS):
-        value, slope = _second(steps, where, found)
+        value, slope = (each[:, 0] for each in _second(steps, where, found[:, None]))
         with np.errstate(divide="ignore", invalid="ignore"):
             move = np.clip(np.where(slope != 0, value / slope, np.nan), -0.5, 0.5)
         found = found - move
@@ -283,18 +284,26 @@ def _zero(steps: np.ndarray, where: np.ndarray, start: np.ndarray) -> tuple[np.n
 
 
 def _second(steps: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Second derivative of the blurred levels at ``at`` (n,) and its slope there, (n,), as of lone steps."""
-    away = where[..., None] + (_ENDS - at[:, None, None])
-    squared = away**2
-    bell = steps * np.exp(-squared / 2)
-    value, slope = (np.einsum("njc,njc->n", bell, each) for each in (away, squared))
-    return value, slope - bell.sum((1, 2))
+    """Second derivative of the blurred levels at ``at`` (n, k) and its slope there, (n, k), as of lone steps.
+
+    Of a step that lies w + e away, w of its outline and e of its cell's end, a Gaussian at a is exp(-(w - a)^2 / 2)
+    exp(e a) times what `_steps` holds already, so that few exponentials tell it at many places.
+    """
+    near = np.exp(_ENDS[:, None] * at[:, None])  # (n, ends, k)
+    plain, once, twice = np.split(
+        steps @ np.concatenate([near, *(_ENDS[:, None] ** p * near for p in (1, 2))], -1), 3, -1
+    )
+    away = where[..., None] - at[:, None]  # (n, J, k)
+    bell = np.exp(-(away**2) / 2)
+    value = bell * (once + away * plain)
+    slope = bell * (twice + 2 * away * once + (away**2 - 1) * plain)
+    return value.sum(1), slope.sum(1)
 
 
 def _rival(steps, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
     """How steep another crossing in the search window (n,), which noise may let win, is at most, over the slope."""
     places = np.linspace(-1, 1, _LOOKED)
-    told = np.stack([_second(steps, where, place * window)[0] for place in places], 1) * np.sign(slope)[:, None]
+    told = _second(steps, where, places * window[:, None])[0] * np.sign(slope)[:, None]
     left, right = told[:, :-1], told[:, 1:]
     size = window * (places[1] - places[0])
     fall = np.where((left >= 0) & (right < 0), (left - right) / size[:, None], 0.0)

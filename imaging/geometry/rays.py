@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from scenes import Solid
+from scenes.materials.vectors import chosen, length, product
 from scenes.parts.rows import different
 
 try:  # has wheels for x86-64
@@ -23,6 +24,7 @@ except ImportError:
 Own = tuple[int, ...] | np.ndarray
 """Faces that no ray, or rays (n, k) each, cannot meet."""
 
+_AT_ONCE = 1 << 14  # rays
 _CHUNK = 50_000  # ray-triangle pairs at a time
 _BUNDLE = 1024  # rays for which triangles that none of them comes near are left out together
 _MANY, _FEW = 2000, 64  # triangles from which on rays are sorted, and bundles of them divided into some of so few
@@ -62,7 +64,7 @@ def first_face(
     shape = origins.shape[:-1]
     rays = np.reshape(origins, (-1, 3)), np.reshape(vectors, (-1, 3))
     own = own.reshape(-1, own.shape[-1]) if isinstance(own, np.ndarray) else own
-    face, t = (by_embree if has_embree() else by_trial)(_plates(solid, margin), *rays, own)
+    face, t = (_in_parts if has_embree() else by_trial)(_plates(solid, margin), *rays, own)
     return face.reshape(shape), t.reshape(shape)
 
 
@@ -97,6 +99,15 @@ def _by_trial_of_each(
     return face, t
 
 
+def _in_parts(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own) -> tuple[np.ndarray, np.ndarray]:
+    """`by_embree` of so few rays at a time that what is made of them stays near to the processor."""
+    face, t = np.empty(len(origins), int), np.empty(len(origins))
+    for at in range(0, len(origins), _AT_ONCE):
+        part = slice(at, at + _AT_ONCE)
+        face[part], t[part] = by_embree(plates, origins[part], vectors[part], _of_rays(own, part))
+    return face, t
+
+
 def by_embree(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own) -> tuple[np.ndarray, np.ndarray]:
     """`first_face` of rays (n, 3): Embree names triangles, one behind the other, until one is met from outside.
 
@@ -105,29 +116,31 @@ def by_embree(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own
     1e-7 of the part's size may count as met or not.
     """
     face, t = np.full(len(origins), -1), np.full(len(origins), np.inf)
-    lengths = np.sqrt(_squared(vectors))
+    lengths = length(vectors)
     at, rays = _entries(plates, origins, vectors, lengths)
     last = np.full(len(origins), -1)
     step = np.full(len(origins), _PAST * plates.radius)
     for _ in range(_MOST_PASSED):
         if not rays.size:
             break
-        ways = vectors[rays] / lengths[rays, None]
-        starts = (origins[rays] + at[rays, None] * vectors[rays] - plates.centre) / plates.radius
+        begin, way = origins.take(rays, 0), vectors.take(rays, 0)
+        ways = way / lengths[rays, None]
+        starts = (begin + at[rays, None] * way - plates.centre) / plates.radius
         found = plates.tree.run(starts.astype(np.float32), ways.astype(np.float32), query="INTERSECT", output=1)
-        met = found["primID"] >= 0
-        rays, which, away = rays[met], found["primID"][met], found["tfar"][met]
+        met = np.flatnonzero(found["primID"] >= 0)
+        rays, begin, way = rays[met], begin.take(met, 0), way.take(met, 0)
+        which, away = found["primID"][met], found["tfar"][met]
         step[rays] = np.where(which == last[rays], 2 * step[rays], _PAST * plates.radius)
         last[rays] = which
         at[rays] += (away.astype(float) * plates.radius + step[rays]) / lengths[rays]
-        outside, place = plates.met(which, origins[rays], vectors[rays])
+        outside, place = plates.met(which, begin, way)
         outside &= ~_among(plates.faces[which], _of_rays(own, rays))
         if plates.margin:
-            near = ~plates.well_within(which, origins[rays] + place[:, None] * vectors[rays])
+            near = np.flatnonzero(~plates.well_within(which, begin + place[:, None] * way))
             some = rays[near]
             most = np.maximum(at[some], np.where(outside, place, 0.0)[near]) + _BENT * plates.radius / lengths[some]
             which[near], place[near] = plates.met_beside(
-                which[near], origins[some], vectors[some], most, _of_rays(own, some)
+                which[near], begin.take(near, 0), way.take(near, 0), most, _of_rays(own, some)
             )
             outside[near] = np.isfinite(place[near])
         face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
@@ -135,13 +148,7 @@ def by_embree(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own
     return face, t
 
 
-def _squared(vectors: np.ndarray) -> np.ndarray:
-    """Squared lengths of vectors (n, 3), (n,): NumPy adds the three numbers of a row more slowly than three columns."""
-    x, y, z = vectors.T
-    return x**2 + y**2 + z**2
-
-
-def _of_rays(own: Own, rays: np.ndarray) -> Own:
+def _of_rays(own: Own, rays: np.ndarray | slice) -> Own:
     """Faces that some of the rays cannot meet."""
     return own[rays] if isinstance(own, np.ndarray) else own
 
@@ -164,8 +171,8 @@ def _entries(
     """Where rays enter the sphere about the triangles, t (n,), and the indices of those that do or begin in it."""
     with np.errstate(all="ignore"):
         away = plates.centre - origins
-        along = np.einsum("ni,ni->n", away, vectors) / lengths
-        aside2 = _squared(away) - along**2
+        along = product(away, vectors) / lengths
+        aside2 = product(away, away) - along**2
         half = np.sqrt(1.1 * plates.radius**2 - aside2)  # NaN for rays that pass it
         at = np.maximum(along - half, 0.0) / lengths
         return at, np.flatnonzero((along + half > 0) & np.isfinite(at))
@@ -250,11 +257,12 @@ def _may_meet(plates: Plates, origins: np.ndarray, vectors: np.ndarray) -> np.nd
 def reaches(solid: Solid, points: np.ndarray, faces: np.ndarray, position: np.ndarray) -> np.ndarray:
     """Whether points (..., 3) on the given faces (...) see a position (broadcast): bool, shape (...)."""
     points, position = np.broadcast_arrays(points, position)
-    normals = solid.normals[faces]
-    found = np.einsum("...i,...i->...", normals, position) > solid.offsets[faces]
+    normals = solid.normals.take(faces, 0)
+    found = product(normals, position) > solid.offsets[faces]
     doubtful = found & ~solid.outer[faces]  # nothing stands over an outer face
-    start = (points + 1e-7 * solid.extent * normals)[doubtful]
-    blocker, t = first_face(solid, position[doubtful], start - position[doubtful], ())
+    start = chosen(points, doubtful) + 1e-7 * solid.extent * chosen(normals, doubtful)
+    origin = chosen(position, doubtful)
+    blocker, t = first_face(solid, origin, start - origin, ())
     found[doubtful] = (blocker < 0) | (t >= 1)
     return found
 
@@ -316,15 +324,15 @@ class Plates:
     def _shares(self, which: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Of the three corners in places (n, 3) of triangles' planes (n,), (3, n); none is negative on a triangle."""
         one, two = (
-            np.einsum("ni,ni->n", places, dual[which]) - shift[which]
+            product(places, dual.take(which, 0)) - shift[which]
             for dual, shift in zip(self.duals, self.shifts, strict=True)
         )
         return np.stack([1 - one - two, one, two])
 
     def met(self, which: np.ndarray, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Whether rays (n, 3) meet the planes of triangles (n,) from outside, and t."""
-        fall = np.einsum("ni,ni->n", vectors, self.normals[which])
-        over = np.einsum("ni,ni->n", origins, self.normals[which]) - self.heights[which]
+        normals = self.normals.take(which, 0)
+        fall, over = product(vectors, normals), product(origins, normals) - self.heights[which]
         with np.errstate(divide="ignore", invalid="ignore"):
             place = -over / fall
             return (fall < 0) & (over > 0) & (place > _STEP), place

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes import Circle, Scene, Solid
+from scenes.materials.vectors import length
 
 _AROUND, _DENSEST = 32, 4.0  # nodes of a ring at least, and nodes a cell where the rim is larger
 _RINGS = np.array([0.0, 0.2, 1.0])  # of the width
@@ -91,8 +92,7 @@ class Annulus:
 
     def _away(self, points: np.ndarray) -> np.ndarray:
         """Distance of points (n, 3) from the rim, positive on the face."""
-        across = np.linalg.norm(points - self.circle.centre, axis=-1)
-        return self.outwards * (across - self.circle.radius)
+        return self.outwards * (length(points - self.circle.centre) - self.circle.radius)
 
 
 def measured_rims(scene: Scene) -> tuple[Circle, ...]:

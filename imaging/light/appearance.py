@@ -17,6 +17,7 @@ from imaging.light.irradiance import bands, beam, electric_field, widened
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
 from scenes import Brdf, Scene
+from scenes.materials.vectors import length
 from scenes.parts.shading import normals_at
 
 
@@ -156,4 +157,4 @@ def polarisation_axis(scene: Scene, which: int, light_at: np.ndarray) -> np.ndar
 
 def unit(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) of length 1."""
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / length(vectors)[..., None]

@@ -13,6 +13,7 @@ from imaging.light.backlight import backlights, backlit
 from imaging.light.between import light_between
 from imaging.pictures import Pictures
 from scenes import Floor, Material
+from scenes.materials.vectors import chosen
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NEAR = 1e-3  # of the object's size: from the sensor, where a ray begins
@@ -99,7 +100,8 @@ def _met(bodies, points, vectors, wanted, own) -> tuple[np.ndarray, np.ndarray]:
     asked = np.broadcast_to(asked, face.shape)
     if isinstance(own, np.ndarray):
         own = np.broadcast_to(own, (*face.shape, own.shape[-1]))[asked]
-    face[asked], t[asked] = first_face(bodies, np.broadcast_to(points, vectors.shape)[asked], vectors[asked], own)
+    rays = chosen(np.broadcast_to(points, vectors.shape), asked), chosen(vectors, asked)
+    face[asked], t[asked] = first_face(bodies, *rays, own)
     return face, t
 
 
@@ -118,7 +120,6 @@ def _where(wanted, places, faces, light_at, test) -> np.ndarray:
     shape = np.broadcast_shapes(wanted.shape, places.shape[:-1], (*light_at.shape[:-1], 1))
     wanted = np.broadcast_to(wanted, shape)
     found = np.zeros(shape, bool)
-    parts = (np.broadcast_to(v, (*shape, 3))[wanted] for v in (places, light_at[..., None, :]))
-    place, light = parts
+    place, light = (chosen(np.broadcast_to(v, (*shape, 3)), wanted) for v in (places, light_at[..., None, :]))
     found[wanted] = test(place, np.broadcast_to(faces, shape)[wanted], light)
     return found

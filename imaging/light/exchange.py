@@ -225,7 +225,7 @@ class Exchanged:
         places = points.reshape(-1, 3)
         asked = list(self._asked(places, faces.ravel()))
         for told, (_, here, share) in zip(_told(self, [number for number, *_ in asked]), asked, strict=True):
-            found.flat[here] += share * told.at(places[here])
+            found.reshape(-1)[here] += share * told.at(places.take(here, 0))
         some = small[faces] & self.exchange.has[faces]
         if some.any():
             found[some] = self._by_patches[faces[some]]
@@ -236,7 +236,7 @@ class Exchanged:
         exchange, left = self.exchange, np.ones(len(points))
         for number, annulus in exchange.annuli.items():
             here = np.flatnonzero(faces == annulus.circle.face)
-            share = np.minimum(annulus.share(points[here]), left[here])
+            share = np.minimum(annulus.share(points.take(here, 0)), left[here])
             here, share = here[share > 0], share[share > 0]
             left[here] -= share
             if here.size:

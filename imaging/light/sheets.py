@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, map_coordinates
 
 from scenes import Scene, Solid
 from scenes.materials.textures import CELLS, ImageTexture, Rectangle, StatisticalTexture
@@ -46,7 +45,7 @@ class Sheet:
     def at(self, points: np.ndarray) -> np.ndarray:
         """Factor at points (..., 3) of the face; beside the rectangle that of its rim."""
         column, row = np.moveaxis(self.nodes(points), -1, 0)
-        return map_coordinates(self.values, [row, column], order=1, mode="nearest")
+        return _between(self.values, row, column)
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,8 @@ class Field:
 
     def filtered(self, grid: np.ndarray) -> np.ndarray:
         """Filtered so that white noise of variance 1 becomes a field of standard deviation ``contrast``."""
+        from scipy.ndimage import gaussian_filter  # slow to load, and rarely needed
+
         gain = self.contrast * np.sqrt(4 * np.pi * np.prod(self.widths))
         return gain * gaussian_filter(grid, self.widths, mode="constant", truncate=_REACH)
 
@@ -115,5 +116,12 @@ def _of_image(texture: ImageTexture, rectangle: Rectangle, normal: np.ndarray) -
     u, v = away @ right / texture.width, away @ np.cross(right, normal) / texture.height
     inside = (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
     height, width = texture.levels.shape
-    levels = map_coordinates(texture.levels, [v * height - 0.5, u * width - 0.5], order=1, mode="nearest")
+    levels = _between(texture.levels, v * height - 0.5, u * width - 0.5)
     return Sheet(rectangle, np.where(inside, levels / texture.white, 1.0))
+
+
+def _between(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """What lies between values (h, w) at rows and columns (...); beside them what is at their border."""
+    from scipy.ndimage import map_coordinates  # slow to load, and rarely needed
+
+    return map_coordinates(values, [row, column], order=1, mode="nearest")

@@ -17,6 +17,7 @@ import numpy as np
 from imaging.features.locator import MIN_USABLE, correlation
 from imaging.features.measurand import Measurands, measurands
 from imaging.features.projected_edges import image_fractions, lines_alone
+from imaging.features.rim_sides import RIM_POINTS, seen_along
 from imaging.geometry.projection import facing
 from imaging.light.appearance import is_separable
 from imaging.light.edge_sides import edge_distance2, of_sides, paper_step, side_strengths
@@ -27,7 +28,7 @@ from imaging.pictures import Pictures
 from imaging.sensor import headroom, shot_noise
 from planner.constraints import Constraints
 from planner.search.objective import Aim, Report, SearchProblem, cut_off, minimised
-from scenes import Scene
+from scenes import Circle, Scene
 
 _ROWS = 256  # sensors at a time
 _PAIRS = 1 << 16  # pairs evaluated exactly at a time
@@ -143,11 +144,12 @@ def _blocks(
 
 def _one_by_one(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> BestPair:
     least, column = (np.full((2, len(sensors)), value) for value in (np.inf, -1))  # of all pairs, and of those within
-    for part, errors, allowed in problem.table(sensors, lights, report):
+    seeing = np.flatnonzero(_seeing(problem.scene, sensors))
+    for part, errors, allowed in problem.table(sensors[seeing], lights, report):
         values = np.where(allowed, minimised(errors, problem.objective), np.inf)
         for k, some in enumerate((values, np.where(cut_off(errors, problem.scene), np.inf, values))):
-            column[k, part] = some.argmin(1)
-            least[k, part] = some.min(1)
+            column[k, seeing[part]] = some.argmin(1)
+            least[k, seeing[part]] = some.min(1)
     within = bool(np.isfinite(least[1]).any())
     spared = within and bool((least[1] > least[0]).any())
     column, least = column[int(within)].astype(int), least[int(within)]
@@ -155,6 +157,22 @@ def _one_by_one(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray,
     variance, *pair = _better(_NONE, np.arange(len(sensors)), column, least)
     pairs = len(sensors) * len(lights)
     return BestPair(*pair, variance, pairs, pairs, column, least, guaranteed=True, within_scale=spared)
+
+
+def _seeing(scene: Scene, sensors: np.ndarray) -> np.ndarray:
+    """Which sensors (S, 2) see something of every edge and circle that is needed, bool (S,): the others measure with no
+    light at all."""
+    pictures = Pictures.of(scene, sensors)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        known = measurands(pictures)
+        needed = known.depends().any(0)
+        edges = len(known.view.names)
+        seen = (known.view.visible | ~needed[:edges]).all(-1)
+        for name, asked in zip(known.circles, needed[edges:], strict=True):
+            circle = scene.solid.round(name)
+            if asked and isinstance(circle, Circle):
+                seen &= seen_along(pictures, circle, circle.angles(RIM_POINTS)).any(-1)
+    return seen
 
 
 _NONE = np.inf, -1, -1

@@ -53,6 +53,23 @@ def dot(a: Vector, b: Vector):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar products (...) of vectors (..., 3): a component at a time, which is several times as fast as along an axis
+    of three."""
+    return dot(components(a), components(b))
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (...) of vectors (..., 3)."""
+    return np.sqrt(product(vectors, vectors))
+
+
+def chosen(vectors: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Those (n, 3) of vectors (..., 3) that are chosen, bool (...): by their numbers, which is several times as fast as
+    NumPy's own way."""
+    return np.reshape(vectors, (-1, 3)).take(np.flatnonzero(which), 0)
+
+
 def cross(a: Vector, b: Vector) -> Vector:
     """Vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -12,7 +12,8 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from scenes.measurands.features import Centre, Corner, Side, Wall, along_of
+from scenes.materials.vectors import components, cross, dot
+from scenes.measurands.features import Centre, Corner, Side, Wall
 from scenes.measurands.measurands import Measurand
 from scenes.parts.solid import Circle, Edge, Solid
 from scenes.units import Unit, in_unit
@@ -156,15 +157,18 @@ def _widths(solid: Solid) -> Iterator[_Row]:
 def _parallel(solid: Solid, edges: list[Edge]) -> Iterator[tuple[float, float, Edge, Edge]]:
     """Of each direction among a face's edges the best pair: what it is worth, how far apart."""
     best: dict[int, tuple[float, float, Edge, Edge]] = {}
-    along = np.array([along_of(solid, Side(edge=edge.name)) for edge in edges])
+    starts, stops = solid.vertices[[edge.ends for edge in edges]].swapaxes(0, 1)
+    lengths = np.linalg.norm(stops - starts, axis=-1)
+    along = (stops - starts) / lengths[:, None]
     direction = (np.linalg.norm(np.cross(along[:, None], along), axis=-1) <= _SAME).argmax(1)  # number of the first
-    for i, k in combinations(range(len(edges)), 2):
-        if direction[i] == direction[k]:
-            start, stop = (solid.vertices[edge.ends[0]] for edge in (edges[i], edges[k]))
-            apart = float(np.linalg.norm(np.cross(stop - start, along[i])))
-            worth = apart * min(solid.length(edges[i]), solid.length(edges[k]))
-            if apart > _SAME * solid.extent and worth > best.get(direction[i], (0.0,))[0] * (1 + _SAME):
-                best[direction[i]] = worth, apart, edges[i], edges[k]
+    for i, number in enumerate(direction.tolist()):
+        others = i + 1 + np.flatnonzero(direction[i + 1 :] == number)
+        across = cross(components(starts[others] - starts[i]), along[i])
+        apart = np.sqrt(dot(across, across))
+        worth = apart * np.minimum(lengths[others], lengths[i])
+        for k in np.flatnonzero(apart > _SAME * solid.extent):
+            if worth[k] > best.get(number, (0.0,))[0] * (1 + _SAME):
+                best[number] = float(worth[k]), float(apart[k]), edges[i], edges[others[k]]
     yield from best.values()
 
 

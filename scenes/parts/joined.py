@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from scenes.materials.vectors import cross
 from scenes.parts.chains import SINGLE, Chain, components
 
 _FLAT = 1e-4  # rad, between the normals of one plane
@@ -68,7 +69,7 @@ def _in_line(vertices: np.ndarray, vertex: int, one: Chain, other: Chain) -> boo
     away = [vertices[next(end for end in chain[0] if end != vertex)] - vertices[vertex] for chain in (one, other)]
     long, short = sorted(away, key=np.linalg.norm, reverse=True)
     size = np.linalg.norm(long)
-    off = np.linalg.norm(np.cross(short, long)) / size
+    off = np.linalg.norm(cross(short, long)) / size
     return bool(short @ long < 0 and off <= 2 * SINGLE * np.abs(vertices).max())
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.materials.vectors import cross
 from scenes.parts.chains import SINGLE
 
 MIN_SEGMENTS = 12  # a loop of fewer straight edges is a polygon, not a circle
@@ -123,9 +124,9 @@ def circle_through(points: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, 
     """
     points = np.asarray(points)  # a mesh tracks its arrays
     middle = points.mean(0)
-    one = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    one = np.array(cross(normal, np.eye(3)[np.abs(normal).argmin()]))
     one /= np.linalg.norm(one)
-    plane = np.stack([one, np.cross(normal, one)])
+    plane = np.stack([one, cross(normal, one)])
     flat = (points - middle) @ plane.T
     design = np.column_stack([2 * flat, np.ones(len(flat))])
     x, y, _ = np.linalg.lstsq(design, (flat**2).sum(1))[0]

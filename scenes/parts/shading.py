@@ -13,6 +13,7 @@ from itertools import chain
 
 import numpy as np
 
+from scenes.materials.vectors import chosen, length, product
 from scenes.parts.chains import SINGLE, components
 from scenes.parts.rows import different
 from scenes.parts.solid import Solid
@@ -36,14 +37,15 @@ def normals_at(solid: Solid, faces: np.ndarray | int, points: np.ndarray) -> np.
     True
     """
     faces = np.asarray(faces)
-    found = solid.normals[faces]
+    found = solid.normals.take(faces, 0)
     facet = ~solid.plane[faces]
     if not facet.any():
         return found
     shape = np.broadcast_shapes(faces.shape, points.shape[:-1])
     found = np.broadcast_to(found, (*shape, 3)).copy()
     facet, faces = np.broadcast_to(facet, shape), np.broadcast_to(faces, shape)
-    found[facet] = _within(solid, faces[facet], np.broadcast_to(points, (*shape, 3))[facet])
+    places = chosen(np.broadcast_to(points, (*shape, 3)), facet)
+    found.reshape(-1, 3)[np.flatnonzero(facet)] = _within(solid, faces[facet], places)
     return found
 
 
@@ -139,17 +141,20 @@ def _weights(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _within(solid: Solid, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Of facets (n,) at points (n, 3): between the corners of that triangle of each in which the point lies."""
     order, first, many = _triangles_of(solid)
-    inside, triangle, share = np.full(len(faces), -np.inf), np.zeros(len(faces), int), np.zeros((len(faces), 3))
-    for k in range(many[faces].max()):
-        some = np.flatnonzero((many[faces] > k) & (inside < 0))
+    inside, triangle, share = np.full(len(faces), -np.inf), np.zeros(len(faces), int), np.zeros((3, len(faces)))
+    count = many[faces]
+    for k in range(count.max()):
+        some = np.flatnonzero((count > k) & (inside < 0))
         which = order[first[faces[some]] + k]
-        shares = _shares(solid, which, points[some])
-        better = shares.min(1) > inside[some]
-        some, which, shares = some[better], which[better], shares[better]
-        inside[some], triangle[some], share[some] = shares.min(1), which, shares
-    found = np.einsum("nk,nki->ni", np.maximum(share, 0), corner_normals(solid)[triangle])
-    size = np.linalg.norm(found, axis=1, keepdims=True)
-    return np.where(size > 0, found / np.where(size > 0, size, 1.0), solid.normals[faces])
+        shares = _shares(solid, which, points.take(some, 0))
+        least = shares.min(0)
+        better = np.flatnonzero(least > inside[some])
+        some = some[better]
+        inside[some], triangle[some], share[:, some] = least[better], which[better], shares[:, better]
+    corners, share = corner_normals(solid).take(triangle, 0), np.maximum(share, 0)[..., None]
+    found = sum(share[k] * corners[:, k] for k in range(3))
+    size = length(found)[:, None]
+    return np.where(size > 0, found / np.where(size > 0, size, 1.0), solid.normals.take(faces, 0))
 
 
 @lru_cache(maxsize=8)
@@ -170,7 +175,7 @@ def _slopes(solid: Solid) -> np.ndarray:
 
 
 def _shares(solid: Solid, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (n, 3) of points (n, 3) in triangles (n,); NaN in those of no area."""
-    away = points - solid.triangles[triangles, 0]
-    second, third = np.moveaxis(np.einsum("nki,ni->nk", _slopes(solid)[triangles], away), 1, 0)
-    return np.stack([1 - second - third, second, third], 1)
+    """Barycentric coordinates (3, n) of points (n, 3) in triangles (n,); NaN in those of no area."""
+    away, slopes = points - solid.triangles.take(triangles, 0)[:, 0], _slopes(solid).take(triangles, 0)
+    second, third = (product(slopes[:, k], away) for k in (0, 1))
+    return np.stack([1 - second - third, second, third])

@@ -9,7 +9,7 @@ import scenes
 from imaging.geometry.projection import direction
 from planner import Constraints
 from planner.search import exhaustive
-from planner.search.objective import SearchProblem
+from planner.search.objective import Aim, SearchProblem
 from tests.pairs import evaluate_pairs
 
 
@@ -56,6 +56,22 @@ def test_where_the_bound_is_far_from_the_value(at_once, poses, monkeypatch):
     assert values[found.sensor, found.light] == pytest.approx(values.min(), rel=1e-12)
 
 
+@pytest.mark.parametrize("name", ["plate", "bracket"])
+def test_sensors_that_do_not_see_all_measure_with_no_light(name):
+    """None of them under any of some lights; of the others some do."""
+    scene = scenes.load(name)
+    polar, azimuth = np.meshgrid([20.0, 60.0, 89.9, 130.0], np.arange(0.0, 360.0, 60.0))
+    sensors = np.column_stack([polar.ravel(), azimuth.ravel()])
+    seeing = exhaustive._seeing(scene, sensors)
+    problem = SearchProblem.of(scene, "calibrated", Aim.of(scene.quantities, "object"))
+    lights = sensors[polar.ravel() < 80]
+    values = problem.values(*(each.reshape(-1, 2) for each in np.broadcast_arrays(sensors[:, None], lights[None])))
+    measures = np.isfinite(values.reshape(len(sensors), -1)).any(1)
+    assert not measures[~seeing].any()
+    assert measures.sum() >= 4
+    assert 6 <= seeing.sum() <= len(seeing) - 6
+
+
 def test_pair_by_pair_the_least_of_each_sensor_is_told():
     """None where nothing can be measured or is allowed; what the scale's end has cut off only where all are."""
     levels = np.array([[5.0, np.inf, 3.0, 8.0], [np.inf] * 4, [2.0, 9.0, 7.0, 6.0], [4.0, 4.5, 1.0, 9.5]])
@@ -68,6 +84,7 @@ def test_pair_by_pair_the_least_of_each_sensor_is_told():
                 yield part, SimpleNamespace(values=levels[part], cut=cut[part]), allowed[part]
 
         with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(exhaustive, "_seeing", lambda scene, sensors: np.ones(len(sensors), bool))
             patch.setattr(exhaustive, "minimised", lambda errors, aim: errors.values)
             patch.setattr(exhaustive, "cut_off", lambda errors, scene: errors.cut)
             problem = SimpleNamespace(table=table, objective=None, scene=None)

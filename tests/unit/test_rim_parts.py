@@ -22,6 +22,19 @@ def plate():
     return scenes.load("plate")
 
 
+def test_second_derivative_of_steps_between_cells(rng):
+    """Of steps beside outlines, blurred by a Gaussian of one standard deviation: as each step alone says."""
+    levels, where = rng.uniform(20, 200, (4, 11, 48)), rng.uniform(-1, 1, (4, 11))
+    at = rng.uniform(-3, 3, (4, 5))
+    value, slope = rim_look._second(rim_look._steps(levels, where), where, at)
+    steps = np.diff(levels) * rim_look._SHARES[:, None]
+    for row, k in np.ndindex(at.shape):
+        away = where[row, :, None] + rim_look._ENDS - at[row, k]
+        bell = steps[row] * np.exp(-(away**2) / 2)
+        assert value[row, k] == pytest.approx((bell * away).sum(), rel=1e-10)
+        assert slope[row, k] == pytest.approx((bell * (away**2 - 1)).sum(), rel=1e-10)
+
+
 def test_zero_of_steps(rng):
     """Of 30 sets of five weighted steps up to a third of a standard deviation off: where their bells balance."""
     where, weight = rng.uniform(-0.35, 0.3, (30, 5)), rng.uniform(0.2, 1.5, 5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from rich.console import Group
 from rich.table import Table
@@ -10,12 +11,13 @@ from rich.text import Text
 
 import planner
 from planner.search.candidates import Candidate, how_far
-from render import EffectTolerance
 from scenes.status import MEANINGS, is_trusted, legend
-from validation.plan_check import ESTIMATOR, FARTHEST, CheckedSetting, PlanCheck
 from validation.report.cells import MODELS
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
+
+if TYPE_CHECKING:
+    from validation.plan_check import CheckedSetting, PlanCheck
 
 _TERMS = (
     "  place, now: in the plan, and by the pictures. calibrated: variance by the formula; propagated: by the rendered",
@@ -214,6 +216,8 @@ def _reading(found: planner.Plan) -> str:
 
 def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
     """The rendered settings, and what follows from them."""
+    from validation.plan_check import FARTHEST  # it loads what renders and measures
+
     if checked.proposed is None:
         table = [_checked_table(found, checked), *map(Text, [*_TERMS, *_statuses(checked)])] if checked.settings else []
         return Group(*table, Text(f"\nNot checked by rendering: {checked.reason}."))
@@ -232,6 +236,8 @@ def _checked(found: planner.Plan, checked: PlanCheck) -> Group:
 
 
 def _checked_table(found: planner.Plan, checked: PlanCheck) -> Table:
+    from validation.plan_check import ESTIMATOR
+
     several = len(found.prediction.measurands) > 1
     unit = "1e-6" if several else f"1e-6 {_units(found)[0 if found.objective == 'object' else 1]}^2"
     columns = (
@@ -273,6 +279,8 @@ def _proposal(checked: PlanCheck) -> str:
 
 def _gain(best: CheckedSetting, plan: CheckedSetting) -> str:
     """What the proposal gains over the plan, in words."""
+    from render import EffectTolerance
+
     if plan.rank_after is None:
         return f"the plan's picture cannot be measured ({plan.status})"
     change = best.minimised / plan.minimised - 1

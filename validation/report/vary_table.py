@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 from rich.console import Group
 from rich.table import Table
@@ -14,7 +15,9 @@ from scenes.results import picked
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
 from validation.strict_json import plain
-from validation.vary_check import VaryCheck
+
+if TYPE_CHECKING:
+    from validation.vary_check import VaryCheck
 
 HELD = {
     "time": "exposure time: a polariser before the lamp and one before the lens each pass half of unpolarised light,"

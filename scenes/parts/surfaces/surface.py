@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from scenes.errors import InvalidInput
+from scenes.materials.vectors import cross
 
 _LARGEST = 1e9  # of a coordinate, as of a mesh
 
@@ -115,7 +116,7 @@ def axes_beside(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     smallest = np.eye(3)[np.abs(axis).argmin()]
     one = smallest - (smallest @ axis) * axis
     one = one / np.linalg.norm(one)
-    return one, np.cross(axis, one)
+    return one, np.array(cross(axis, one))
 
 
 def outwards(hollow: bool) -> float:
