@@ -11,10 +11,8 @@ import measure
 import planner
 import render
 import scenes
-from imaging.features.locator import edge_blur
 from imaging.geometry.lens import lens_jacobian, recorded, undistorted
 from imaging.geometry.projection import project, project_ideal
-from measure.estimators.crossings import STEP
 from render.phenomena import EFFECTS
 from scenes import InvalidInput, plugins
 from scenes.cameras import LENSES
@@ -24,7 +22,7 @@ from scenes.materials import MATERIALS
 from scenes.measurands.kinds import MEASURANDS
 from scenes.registry import Registry
 from tests.commands import ice
-from tests.oracle import block_image
+from tests.oracle import at_a_place, block_image
 
 KINDS = {
     "spotlight": LIGHTS, "median": measure.ESTIMATORS, "vignetting": EFFECTS, "eccentricity": MEASURANDS,
@@ -136,10 +134,8 @@ def test_a_material_s_lobe_is_rendered_as_it_is_predicted(satin):
     assert inside.sum() > 500
     assert (clean - matt)[inside] == pytest.approx((expected - matt)[inside], rel=0.01)  # margin: 1e-3 is measured
     told, found = planner.predict(satin, *GLEAM), measure.propagate(clean, satin, *GLEAM)
-    # a crossing at one of the places of its profile, half a px apart: the cubic through four of them is less steep
-    near, next_ = (np.exp(-((k * STEP) ** 2) / (2 * (1 + edge_blur(satin.camera.blur_px) ** 2))) for k in (1, 2))
     # margin: the renderer's own noise, half a per cent
-    assert found.variance_px2 == pytest.approx(told.variance_px2 / ((4 * near - next_) / 3) ** 2, rel=0.02)
+    assert found.variance_px2 == pytest.approx(told.variance_px2 * at_a_place(satin.camera.blur_px), rel=0.02)
     assert measure.distance(clean, satin, *GLEAM).value_px == pytest.approx(told.value_px + told.bias_px, abs=3e-3)
 
 
