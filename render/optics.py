@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import cv2
 import numpy as np
@@ -44,8 +45,8 @@ def blur_and_bin(fine: np.ndarray, camera: Camera, supersample: int, start: tupl
             soft = min(_SOFT, blur)
             fine = distort(_blurred(fine, soft), camera, start, supersample)
         fine = _blurred(_dimmed(fine, camera, supersample, start), np.sqrt(blur**2 - soft**2))
-    height, width = fine.shape[0] // supersample, fine.shape[1] // supersample
-    return fine.reshape(height, supersample, width, supersample).mean(axis=(1, 3))
+    rows = reduce(np.add, (fine[k::supersample] for k in range(supersample)))
+    return reduce(np.add, (rows[:, k::supersample] for k in range(supersample))) / supersample**2
 
 
 def _unevenly(fine: np.ndarray, camera: Camera, supersample: int, start: tuple[int, int]) -> np.ndarray:

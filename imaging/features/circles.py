@@ -158,9 +158,9 @@ def calibrated_circle(
 
     Points weigh as they count (`RimImage.share`) times the squared contrast over the noise's variance. ``kappa2``,
     (..., n) or one number, is a point's variance over that of the noise at unit contrast, and errors d px apart
-    correlate as exp(-d^2 / (4 scale^2)): to second order, as along an edge, the variance is 2 sqrt(pi) scale times that
-    of independent points a px, less 2 scale^2 at each end of a piece that is used, and less where it begins by and by
-    (`_at_ends`); infinite where the pieces are so short that this would not be positive. Disturbed points and those of
+    correlate as exp(-d^2 / (4 scale^2)): the variance is 2 sqrt(pi) scale times that of independent points a px, less
+    what correlation lacks at the ends of pieces that are used and wherever else a point's part changes along the rim
+    (`_lacking`); infinite where the pieces are so short that this would not be positive. Disturbed points and those of
     a squared contrast below ``weakest`` times the noise's variance are left out; a tenth of a turn must be left.
     ``shared``, (..., n, n), is what the points' errors have in common at unit contrast (`imaging.row_noise.of_points`).
     """
@@ -170,17 +170,16 @@ def calibrated_circle(
         _weighted(np.where(share > 0, weight * ratio, 0.0), circle.design)
         for weight in (share * circle.arc, kappa2 * share**2 * circle.arc)
     )
-    variance = np.where(share > 0, kappa2 * ratio, 0.0)
-    ends = _at_ends(share, variance, circle.design, circle.arc / scale)
-    scatter = 2 * np.sqrt(np.pi) * scale * along - 2 * scale**2 * ends
+    pull = share[..., None] * np.sqrt(np.where(share > 0, kappa2 * ratio, 0.0))[..., None] * circle.design
+    scatter = 2 * np.sqrt(np.pi) * scale * along - 2 * scale**2 * _lacking(pull, circle.arc / scale)
     enough = circle.turn * (share >= HALF).mean(-1) >= LEAST_SEEN
     inverse = _covariance(information, enough & _positive(scatter))
     good = np.isfinite(inverse).all((-1, -2))[..., None, None]
     known = np.where(good, inverse, 0.0)
     if shared is not None:
-        pull = np.where(share > 0, share * circle.arc * np.sqrt(circle.squared) / circle.noise_variance, 0.0)
-        pull = pull[..., None] * circle.design
-        scatter = scatter + np.einsum("...ni,...nm,...mj->...ij", pull, np.nan_to_num(shared), pull, optimize=True)
+        level = np.where(share > 0, share * circle.arc * np.sqrt(circle.squared) / circle.noise_variance, 0.0)
+        level = level[..., None] * circle.design
+        scatter = scatter + np.einsum("...ni,...nm,...mj->...ij", level, np.nan_to_num(shared), level, optimize=True)
     return np.where(good, known @ scatter @ known, inverse)
 
 
@@ -192,27 +191,22 @@ def _weighted(weights: np.ndarray, design: np.ndarray) -> np.ndarray:
     return found.reshape(*found.shape[:-1], parts, parts)
 
 
-def _at_ends(share: np.ndarray, variance: np.ndarray, design: np.ndarray, arc: np.ndarray) -> np.ndarray:
-    """What correlation lacks where points begin and cease to count, (..., p, p), for errors of points of variances
-    (..., n) that move what a design (..., n, p) says.
+def _lacking(pull: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    """What correlation lacks where points' parts change, (..., p, p), of parts (..., n, p).
 
-    A share w(x) that changes in steps d_k at places x_k has, for errors that correlate as exp(-u^2 / 4), a double
+    A part w(x) that changes in steps d_k at places x_k has, for errors that correlate as exp(-u^2 / 4), a double
     integral of 2 sqrt(pi) times that of w^2, less 2 sum d_k d_l f(x_k - x_l), f(u) = exp(-u^2 / 4) - sqrt(pi) u / 2
-    erfc(u / 2): 1 for each hard end, as good as nothing for one that is long. ``arc`` (..., n) is in smoothing scales.
+    erfc(u / 2): 1 for each hard end, as good as nothing where it changes slowly. ``arc`` (..., n) is in smoothing
+    scales.
     """
-    rise = np.roll(share, -1, -1) - share  # of a rise the point counts at which it ends
-    found = _weighted((np.minimum(rise, 0.0) ** 2 + np.roll(np.maximum(rise, 0.0), 1, -1) ** 2) * variance, design)
-    if not ((share > 0) & (share < 1)).any():
-        return found
-    error = np.sqrt(variance)[..., None] * design
-    steps = rise[..., None] * np.where(rise[..., None] > 0, np.roll(error, -1, -2), error)
-    apart = np.broadcast_to(arc, share.shape)
-    for k in range(1, min(int(_FAR / max(apart.min(), 1e-300)), share.shape[-1] // 2) + 1):
-        half = k * apart / 2
-        joint = (np.exp(-(half**2)) - np.sqrt(np.pi) * half * erfc(half))[..., None] * steps
-        one = np.einsum("...ni,...nj->...ij", joint, np.roll(steps, -k, -2))
-        found = found + one + np.swapaxes(one, -1, -2)
-    return found
+    steps = np.roll(pull, -1, -2) - pull
+    onward = steps / 2
+    nearest = max(float(np.nanmin(arc, initial=_FAR)), 1e-300)
+    for k in range(1, min(int(_FAR / nearest), steps.shape[-2] // 2) + 1):
+        half = k * arc / 2
+        onward += (np.exp(-(half**2)) - np.sqrt(np.pi) * half * erfc(half))[..., None] * np.roll(steps, -k, -2)
+    found = np.swapaxes(steps, -1, -2) @ onward
+    return found + np.swapaxes(found, -1, -2)
 
 
 def _positive(matrices: np.ndarray) -> np.ndarray:

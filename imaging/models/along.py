@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imaging.features.locator import reach
+from imaging.features.locator import reach, spacing
 from imaging.features.measurand import Measurands, measurands, normals
 from imaging.features.projected_edges import ProjectedEdges, cut, edge_ends, end_divisors, image_fractions
 from imaging.geometry.blur import blur_at
@@ -32,6 +32,8 @@ class EdgeNodes:
         Places from the middle of the used part, ideal px.
     middle, length : ndarray, shape (..., E, 1)
         That middle's distance from the edge's first end, and the used length, ideal px.
+    spacing : ndarray, shape (..., E, 1)
+        Between the edge points there (`locator.spacing`), ideal px.
     spatial : ndarray, shape (..., E, n)
         Fractions of the edge's length in space.
     blur : ndarray, shape (..., E, n), or float
@@ -43,6 +45,7 @@ class EdgeNodes:
     t: np.ndarray
     middle: np.ndarray
     length: np.ndarray
+    spacing: np.ndarray
     spatial: np.ndarray
     blur: np.ndarray | float
     across: np.ndarray | float
@@ -88,7 +91,7 @@ def place_nodes(pictures: Pictures, view: ProjectedEdges, trims: np.ndarray) -> 
     across = along = 1.0
     if camera.lens.bends:
         across, along = _magnified(camera, view, places)
-    return EdgeNodes(t, middle, length, spatial, blur, across, along)
+    return EdgeNodes(t, middle, length, spacing(length, pictures.scene.locator.scale_px), spatial, blur, across, along)
 
 
 def _magnified(camera, view: ProjectedEdges, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

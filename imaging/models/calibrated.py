@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from imaging.features.circles import calibrated_circle
-from imaging.features.locator import MIN_CONTRAST, MIN_USABLE, correlation, kappa2
+from imaging.features.locator import FEWEST, MIN_CONTRAST, MIN_USABLE, correlation, kappa2, lacking
 from imaging.features.measurand import normals
 from imaging.light.appearance import is_separable
-from imaging.models.along import NODE_WEIGHTS, Along, EdgeNodes
+from imaging.models.along import NODE_WEIGHTS, NODES, Along, EdgeNodes
 from imaging.models.errors import Errors, LineVariance, combined
 from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
 from imaging.row_noise import of_lines, of_points
 
-SHORT = 10.0  # smoothing scales: shorter edges take the double integral
+SHORT = 10.0  # smoothing scales: shorter edges take the sum over their points
+POINTS = np.linspace(-1, 1, FEWEST)  # of a short edge, in half used lengths from the middle
+POINT_WEIGHTS = np.array([0.5, *[1.0] * (FEWEST - 2), 0.5]) * 2 / (FEWEST - 1)
 
 
 def calibrated(pictures: Pictures) -> Errors:
     """Absolute px^2 from camera, exposure, blur, noise, image length and the locator's closed form.
 
-    Edge points lie densely along the trimmed edge; their errors have variance kappa^2 s_n^2 / C^2, s_n^2 the mean of
-    both sides' noise, and correlation exp(-d^2 / (4 s^2)). With f(t) the weight that the least-squares line gives to an
-    error at t in A d + B theta, the variance is the double integral of f f' sigma sigma' correlation:
-    2 sqrt(pi) s integral of g^2 - 2 s^2 (g^2 at both ends) + 8/3 s^4 g'^2, g = f sigma, exact for a linear g on a long
-    edge; on an edge of less than 10 s the double integral itself. Where the contrast changes by more than a factor 2
+    Edge points lie up to 2 s apart along the trimmed edge (`locator.spacing`), of which the first and the last count
+    half; their errors have variance kappa^2 s_n^2 / C^2, s_n^2 the mean of both sides' noise, and correlation
+    exp(-d^2 / (4 s^2)). With f(t) the weight that the least-squares line gives to an error at t in A d + B theta, over
+    the spacing, and g = f sigma, the variance is 2 sqrt(pi) s times the integral of g^2, with what the points are
+    short of and have more (`locator.lacking`), for a linear g on a long edge; on an edge of less than 10 s the sum
+    over its points itself. Where the contrast changes by more than a factor 2
     along an edge (gloss, or another part of the object behind it), points below `MIN_CONTRAST` are dropped and the
     first order alone is taken. What rows and columns of pixels share is added (`imaging.row_noise`). Infinite where an
     edge has too little contrast or length to be measured. Errors are found where the lens records the edge; its local
@@ -49,7 +55,7 @@ def _calibrated(pictures: Pictures) -> Errors:
             variance = (long_edge(nodes, weight, line_slope(nodes, a, b), scale) * per_point).sum(-1)
             short = np.broadcast_to(nodes.length[..., 0] < SHORT * scale, variance.shape)
             if short.any():
-                variance[short] = _double_integral(*_picked(nodes, weight * np.sqrt(per_point), short), scale)
+                variance[short] = _sum_of_points(*_picked(nodes, weight * np.sqrt(per_point), short), scale)
             if not is_separable(scene):
                 rough = squared.max(-1) > ROUGH * squared.min(-1)
                 if rough.any():
@@ -89,7 +95,8 @@ def _of_shared(pictures: Pictures, along: Along, a: np.ndarray, b: np.ndarray) -
     """What noise that rows and columns share adds to the variance of each line (..., E), at its mean contrast."""
     scene, nodes = pictures.scene, along.nodes
     blur, across = (np.mean(part * np.ones(1), -1) for part in (nodes.blur, nodes.across))
-    length, slope = nodes.length[..., 0], line_slope(nodes, a, b)[..., 0]
+    length = nodes.length[..., 0]
+    slope = 12 * (b - a * nodes.middle[..., 0]) / length**3  # what is shared changes little from point to point
     added = of_lines(
         scene.noise, a / length, slope, length, normals(along.measurands.view), blur, scene.locator.scale_px
     )
@@ -107,8 +114,9 @@ def line_weight(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def line_slope(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Its derivative by t, (..., E, 1)."""
-    return 12 * (b[..., None] - a[..., None] * nodes.middle) / nodes.length**3
+    """Its derivative by t, (..., E, 1): the points' sum of t^2 is L^3 / 12 + L h^2 / 6 over the spacing h."""
+    spread = nodes.length * (nodes.length**2 + 2 * nodes.spacing**2) / 12
+    return (b[..., None] - a[..., None] * nodes.middle) / spread
 
 
 def long_edge(nodes: EdgeNodes, weight: np.ndarray, slope: np.ndarray, scale: float) -> np.ndarray:
@@ -119,12 +127,30 @@ def long_edge(nodes: EdgeNodes, weight: np.ndarray, slope: np.ndarray, scale: fl
     inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * nodes.length / 2
     ends = np.array([1.0] + [0.0] * len(NODE_WEIGHTS) + [1.0])
     span = scale / nodes.along
-    tilted = 8 / 3 * span**4 * slope**2 / nodes.length
-    return inside * (2 * np.sqrt(np.pi) * span * weight**2 + tilted) - 2 * span**2 * ends * weight**2
+    end, tilt = lacking((nodes.spacing / span) ** 2)
+    tilted = (tilt * span**4 / nodes.length + np.sqrt(np.pi) / 3 * span * nodes.spacing**2) * slope**2
+    return inside * (2 * np.sqrt(np.pi) * span * weight**2 + tilted) - end * span**2 * ends * weight**2
+
+
+@cache
+def to_points() -> np.ndarray:
+    """Takes what is known at an edge's nodes to the points of a short one, (`FEWEST`, n): by a polynomial."""
+    nodes = np.array([-1.0, *NODES, 1.0])
+    return legvander(POINTS, nodes.size - 1) @ np.linalg.inv(legvander(nodes, nodes.size - 1))
+
+
+def point_products(g: np.ndarray, length: np.ndarray, scale: float) -> np.ndarray:
+    """Products of what the points of short edges add, (..., `FEWEST`, `FEWEST`), whose sum is the variance.
+
+    ``g`` is given at the nodes, (..., n), ``length`` is (..., 1).
+    """
+    weighted = g @ to_points().T * POINT_WEIGHTS * length / 2
+    kernel = correlation((POINTS[:, None] - POINTS) * length[..., None] / 2, scale)
+    return weighted[..., :, None] * weighted[..., None, :] * kernel
 
 
 def _picked(nodes: EdgeNodes, g: np.ndarray, which: np.ndarray):
-    return (np.broadcast_to(v, (*which.shape, v.shape[-1]))[which] for v in (g, nodes.t, nodes.length))
+    return (np.broadcast_to(v, (*which.shape, v.shape[-1]))[which] for v in (g, nodes.length))
 
 
 def _first_order(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray, per_point: np.ndarray, kept: np.ndarray) -> np.ndarray:
@@ -139,8 +165,6 @@ def _first_order(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray, per_point: np.n
     return np.where((total[..., 0] >= MIN_USABLE) & (spread[..., 0] > 0), variance, np.inf)
 
 
-def _double_integral(g: np.ndarray, t: np.ndarray, length: np.ndarray, scale: float) -> np.ndarray:
-    """Integral of g(t) g(t') correlation(t - t') over both; never negative."""
-    weighted, inner = g[..., 1:-1] * NODE_WEIGHTS * length / 2, t[..., 1:-1]
-    kernel = correlation(inner[..., :, None] - inner[..., None, :], scale)
-    return np.einsum("...i,...ij,...j->...", weighted, kernel, weighted)
+def _sum_of_points(g: np.ndarray, length: np.ndarray, scale: float) -> np.ndarray:
+    """Sum of g g' correlation over the points of short edges; never negative."""
+    return point_products(g, length, scale).sum((-1, -2))

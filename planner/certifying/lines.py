@@ -15,10 +15,10 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.features.locator import MIN_USABLE, PIXEL_VARIANCE, reach
+from imaging.features.locator import FEWEST, MIN_USABLE, PIXEL_VARIANCE, SPACING, lacking, reach
 from imaging.geometry.visibility import boundaries
 from imaging.models.along import NODE_WEIGHTS, NODES
-from imaging.models.calibrated import SHORT
+from imaging.models.calibrated import POINT_WEIGHTS, POINTS, SHORT
 from planner.certifying.enclosed import HUGE, Enclosed, either
 from planner.certifying.series import bernstein, dot, with_last, within
 from planner.certifying.view import View
@@ -28,6 +28,8 @@ _PLACES = np.concatenate([[-1.0], NODES, [1.0]])  # of nodes, in half used lengt
 _INSIDE = np.concatenate([[0.0], NODE_WEIGHTS, [0.0]])
 UNEVEN = 2.5  # how much r^6 may change along an edge for its middle and its ends to be weighed at a glance
 _ENDS = np.array([1.0] + [0.0] * len(NODE_WEIGHTS) + [1.0])
+_COARSE = 1 + 2 / (FEWEST - 1) ** 2  # the fewest points' sum of t^2 over the integral of t^2
+_LACKING = lacking(SPACING**2)[0]  # the most at an end
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +167,18 @@ class Line:
         """Length that is used, px."""
         return (self.length * self.share).kept(*self.wanted)
 
+    @property
+    def is_wanted_long(self) -> bool:
+        """Whether what is used by the poses that count is longer than `SHORT` scales, or shorter."""
+        return self.wanted[0] >= SHORT * self.view.scene.locator.scale_px
+
     @cached_property
     def spatial(self) -> Enclosed:
-        """Shares of the edge's length in space at which the nodes lie, (n, j)."""
+        """Shares of the edge's length in space at which the nodes of a long part lie, the points of a short one,
+        (n, j)."""
+        places = _PLACES if self.is_wanted_long else POINTS
         middle = (self.trims[0] - self.trims[1] + 1.0) * 0.5
-        at = within(middle.wide() + self.share.wide() * (_PLACES / 2))
+        at = within(middle.wide() + self.share.wide() * (places / 2))
         near, far = (each.wide() for each in self.divisors)
         return within(at * near / (far + at * (near - far)))
 
@@ -180,28 +189,34 @@ class Line:
 
     @cached_property
     def basis(self) -> Enclosed:
-        """Bernstein's polynomials at the nodes, (n, j, DEGREE + 1)."""
+        """Bernstein's polynomials there, (n, j, DEGREE + 1)."""
         return bernstein(self.spatial)
+
+    @cached_property
+    def _spacing(self) -> Enclosed:
+        """Of edge points, in lengths that are used (`imaging.features.locator.spacing`)."""
+        steps = self.used * (1 / (SPACING * self.view.scene.locator.scale_px)) + 0.5
+        return steps.at_least(FEWEST - 1.0).inverse()
 
     def factors(self, start: Enclosed, stop: Enclosed) -> tuple[Enclosed, np.ndarray, np.ndarray]:
         """As of `Terms`, (n, DEGREE + 3), its norms and what it spares, (n, 2) each, from derivatives over h by the
-        displacement of both ends; of a part that is wanted longer than `SHORT` scales, or shorter."""
+        displacement of both ends."""
         scale = self.view.scene.locator.scale_px
         skew = self.trims[1] - self.trims[0]
         lever = (stop * (skew + 1.0) - start * (-skew + 1.0)) * 0.5  # times the share that is used
-        weight = (start + stop).wide() + (lever / self.share).wide() * (6 * _PLACES)
-        if self.wanted[0] >= SHORT * scale:
-            found, spare = self._long(weight, lever / self.share, scale)
+        tilt = lever / self.share / (self._spacing.square() * 2.0 + 1.0)
+        if self.is_wanted_long:
+            found, spare = self._long((start + stop).wide() + tilt.wide() * (6 * _PLACES), tilt, scale)
             return found, self._least(start + stop, lever, scale), spare
-        found, spare = self._short(weight, scale)
+        found, spare = self._short((start + stop).wide() + tilt.wide() * (6 * POINTS), scale)
         return found, self._norms(start + stop, lever, scale), spare
 
     def _least(self, offset: Enclosed, lever: Enclosed, scale: float) -> np.ndarray:
         """Of a long part, as of A d + B theta by points of equal noise, the least of what r^6 is multiplied with, where
         that is at the ends no more than `UNEVEN` times as large as at any place; and nothing taken away, (n, 2)."""
         spans = scale / np.stack([self.used.low, self.used.high])
-        even = (2 * np.sqrt(np.pi) * spans - 4 * UNEVEN * spans**2).min(0)
-        odd = (2 / 3 * np.sqrt(np.pi) * spans - 4 * UNEVEN * spans**2).min(0)
+        even = (2 * np.sqrt(np.pi) * spans - 2 * _LACKING * UNEVEN * spans**2).min(0)
+        odd = (2 / 3 * np.sqrt(np.pi) * spans - 2 * _LACKING * UNEVEN * spans**2).min(0) / _COARSE
         kappa = self.kappa2.low.min(1) if isinstance(self.kappa2, Enclosed) else self.kappa2
         tilt = (lever / self.share).square().low
         found = (
@@ -213,7 +228,7 @@ class Line:
         """Norms of A + 6 lambda x by exp(-(L (x - x') / 4 s)^2), whose means of 1 and of x x' / L^2 fall with L."""
         even, odd = _means(self.used.high / scale)
         flat = _means(self.used.low / scale)[0]
-        height, kappa = self.height, self.kappa2
+        height, kappa, lever = self.height, self.kappa2, lever * (1 / _COARSE)
         least, most = (kappa.low.min(1), kappa.high.max(1)) if isinstance(kappa, Enclosed) else (kappa, kappa)
         tilt = (lever * self.length).square().low * odd / scale**2
         norm = height.low * np.sqrt(least * (offset.square().low * even + 36 * tilt))
@@ -228,25 +243,25 @@ class Line:
         size *= float(np.linalg.norm(ends[1] - ends[0]))
         over = self.divisors[0] * self.divisors[1] / (self.share * size)  # h / used
         share = (over * self.height).wide() * (np.sqrt(np.pi) * scale * _INSIDE)
-        less = over.square().wide() * (-2 * scale**2 * _ENDS)
-        tilt = (lever / self.used).square() * over.square()
-        factor = weight.square() * (share + less) + tilt.wide() * (192 * scale**4 * _INSIDE)
+        end, tilt = lacking((self._spacing * self.used / scale).square())
+        less = (over.square() * end).wide() * (-(scale**2) * _ENDS)
+        tilted = (lever / self.used).square() * over.square() * tilt * (72 * scale**4)
+        coarse = (lever * self._spacing).square() * over * self.height * (24 * np.sqrt(np.pi) * scale)
+        factor = weight.square() * (share + less) + (tilted + coarse).wide() * _INSIDE
         each = factor * self.kappa2
         values = each.wide() * self.basis
         spare = np.stack([np.zeros(len(each.high)), np.maximum(each.high, 0.0).sum(-1)], -1)
         return with_last(with_last(values.sum(-2), None), (weight.square() * less * self.kappa2).sum()), spare
 
     def _short(self, weight: Enclosed, scale: float) -> tuple[Enclosed, np.ndarray]:
-        """The double integral by r^3 r'^3 = (r^6 + r'^6) / 2 - (r^3 - r'^3)^2 / 2."""
+        """The sum over points by r^3 r'^3 = (r^6 + r'^6) / 2 - (r^3 - r'^3)^2 / 2."""
         kappa = self.kappa2.sqrt() if isinstance(self.kappa2, Enclosed) else np.sqrt(self.kappa2)
-        part = weight[..., 1:-1] * (NODE_WEIGHTS / 2) * self.height.wide()
-        part = part * (kappa[..., 1:-1] if isinstance(kappa, Enclosed) else kappa)
-        apart = (self.used.square()[..., None, None]) * ((NODES[:, None] - NODES) / (4 * scale)) ** 2
+        part = weight * (POINT_WEIGHTS / 2) * self.height.wide() * kappa
+        apart = (self.used.square()[..., None, None]) * ((POINTS[:, None] - POINTS) / (4 * scale)) ** 2
         kernel = (-apart).of(np.exp, np.exp, rising=True)
         pairs = part[..., :, None] * part[..., None, :] * kernel
-        basis = self.basis[..., 1:-1, :]
         crowd = pairs.sum()
-        values = with_last((crowd.wide() * basis).sum(-2), pairs.absolute().sum().sum() * -0.5)
+        values = with_last((crowd.wide() * self.basis).sum(-2), pairs.absolute().sum().sum() * -0.5)
         spare = [np.maximum(-pairs.low, 0.0).sum((-1, -2)) / 2, np.maximum(crowd.high, 0.0).sum(-1)]
         return with_last(values, -((-crowd).at_least(0.0).sum())), np.stack(spare, -1)
 
@@ -268,7 +283,7 @@ def _kappa2(scene: Scene, divisors: tuple[Enclosed, Enclosed], spatial: Enclosed
 def _means(lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Means of the correlation and of x x' times it over the squared length, x and x' along edges so many scales long,
     each (n,); both fall with the length."""
-    kernel = np.exp(-((lengths[:, None, None] * (NODES[:, None] - NODES) / 4) ** 2)) / 4
-    flat = np.einsum("i,nij,j->n", NODE_WEIGHTS, kernel, NODE_WEIGHTS)
-    tilted = np.einsum("i,nij,j->n", NODE_WEIGHTS * NODES, kernel, NODE_WEIGHTS * NODES)
+    kernel = np.exp(-((lengths[:, None, None] * (POINTS[:, None] - POINTS) / 4) ** 2)) / 4
+    flat = np.einsum("i,nij,j->n", POINT_WEIGHTS, kernel, POINT_WEIGHTS)
+    tilted = np.einsum("i,nij,j->n", POINT_WEIGHTS * POINTS, kernel, POINT_WEIGHTS * POINTS)
     return flat, tilted / lengths**2

@@ -14,15 +14,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imaging.features.locator import MIN_USABLE, correlation
+from imaging.features.locator import MIN_USABLE
 from imaging.features.measurand import Measurands, measurands
 from imaging.features.projected_edges import image_fractions, lines_alone
 from imaging.features.rim_sides import RIM_POINTS, seen_along
 from imaging.geometry.projection import facing
 from imaging.light.appearance import is_separable
 from imaging.light.edge_sides import edge_distance2, of_sides, paper_step, side_strengths
-from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
-from imaging.models.calibrated import SHORT, line_slope, line_weight, long_edge, point_variance
+from imaging.models.along import EdgeNodes, place_nodes
+from imaging.models.calibrated import (
+    SHORT,
+    line_slope,
+    line_weight,
+    long_edge,
+    point_products,
+    point_variance,
+    to_points,
+)
 from imaging.models.paper import PAPER_KAPPA2, PAPER_POINTS
 from imaging.pictures import Pictures
 from imaging.sensor import headroom, shot_noise
@@ -368,9 +376,7 @@ def _coefficients(
     factor = long_edge(nodes, weight, slope, scale) * per_point
     extra = np.zeros_like(nodes.length)
     short = good & np.isfinite(nodes.length[..., 0]).all(-1) & (nodes.length[..., 0] < SHORT * scale).any(-1)
-    inside = np.concatenate([[0], NODE_WEIGHTS, [0]]) * nodes.length / 2
-    weighted = weight * inside * np.sqrt(per_point)
-    crowd, spare = _short(weighted[short], nodes.t[short], scale)
+    crowd, spare = _short((weight * np.sqrt(per_point))[short], nodes.length[short], scale)
     is_short = nodes.length[short] < SHORT * scale
     factor[short] = np.where(is_short, crowd, factor[short])
     extra[short] = np.where(is_short, -spare, 0.0)
@@ -378,7 +384,7 @@ def _coefficients(
     return np.concatenate([extra, values], -1)
 
 
-def _short(weighted: np.ndarray, t: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+def _short(g: np.ndarray, length: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Short edges: r^3 r'^3 = (r^6 + r'^6) / 2 - (r^3 - r'^3)^2 / 2; coefficients of r^6, and the most of the rest."""
-    kernel = weighted[..., :, None] * weighted[..., None, :] * correlation(t[..., :, None] - t[..., None, :], scale)
-    return kernel.sum(-1), np.abs(kernel).sum((-1, -2))[..., None] / 2
+    products = point_products(g, length, scale)
+    return products.sum(-1) @ to_points(), np.abs(products).sum((-1, -2))[..., None] / 2

@@ -26,7 +26,6 @@ STEP, MIDDLE = 3.0, 6.4
 OFFSET = np.hypot(MIDDLE - STEP, HIGH - LOW)
 POSES = [((20.0, 20.0), (35.0, 60.0)), ((40.0, 350.0), (30.0, 40.0)), ((55.0, 30.0), (25.0, 300.0))]
 IMAGES = 400
-TOO_LARGE = "measured over predicted is 0.85 and 0.94 of a variance (12 seeds): a short edge has few points"
 
 
 @cache
@@ -94,10 +93,7 @@ def test_derivatives_are_differences(folder, sensor, light):
 
 @pytest.mark.parametrize(
     ("sensor", "light", "focal", "length"),
-    [
-        ((28.0, 111.0), (28.0, 174.0), 1200.0, 33),
-        pytest.param((31.0, 194.0), (41.0, 159.0), 600.0, 18, marks=pytest.mark.xfail(reason=TOO_LARGE)),
-    ],
+    [((28.0, 111.0), (28.0, 174.0), 1200.0, 33), ((31.0, 194.0), (41.0, 159.0), 600.0, 18)],
 )
 def test_scatter_is_as_predicted(folder, sensor, light, focal, length):
     """Of 400 noisy pictures, of the two that are ok. A variance a third larger or smaller would be refused."""
@@ -118,7 +114,7 @@ def test_scatter_is_as_predicted(folder, sensor, light, focal, length):
 
 
 def test_scatter_of_short_edges_is_as_propagated(folder):
-    """Of 18 px, of which the prediction is too large: what is reported with each value is true."""
+    """Of 18 px, one beside the border of a shadow, which the prediction leaves out: what is reported is true."""
     scene, sensor, light = stepped(folder, 600.0), (31.0, 194.0), (41.0, 159.0)
     clean = render.image(scene, sensor, light)
     told = np.diag(measure.propagate(clean, scene, sensor, light, estimator="gradient").measurands.covariance)

@@ -1,15 +1,28 @@
-"""Points that have too little contrast are dropped from a line: against the normal equations of dense points."""
+"""The variance of a line: against sums over edge points, and where points of too little contrast are dropped."""
 
 import numpy as np
 import pytest
 
+from imaging.features.locator import correlation, points_along, spacing
 from imaging.models.along import NODES, EdgeNodes
-from imaging.models.calibrated import _double_integral, _first_order, line_slope, line_weight, long_edge
+from imaging.models.calibrated import _first_order, _sum_of_points, line_slope, line_weight, long_edge
+from measure.features.lines import line_map, trapezoid
+
+SCALE = 1.2
+WANTED = [(1.0, 0.0), (0.0, 30.0), (0.3, -25.0)]  # of offset at the first end, px, and tilt
 
 
 def nodes(length, middle):
     t = length / 2 * np.concatenate([[-1], NODES, [1]])
-    return EdgeNodes(t[None], np.array([[middle]]), np.array([[length]]), None, 0.6, 1.0, 1.0)
+    apart = spacing(np.array([[length]]), SCALE)
+    return EdgeNodes(t[None], np.array([[middle]]), np.array([[length]]), apart, None, 0.6, 1.0, 1.0)
+
+
+def of_points(length, middle, a, b, sigma=lambda t: 1.0):
+    """The variance by the line through the points that `gradient` has, of errors of standard deviations sigma(t)."""
+    t = np.linspace(-length / 2, length / 2, points_along(length, SCALE))
+    weight = np.array([a, b]) @ line_map(t + middle, trapezoid(t)) * sigma(t)
+    return weight @ correlation(t[:, None] - t, SCALE) @ weight
 
 
 @pytest.mark.parametrize("cut", [0.0, -6.0])
@@ -37,29 +50,40 @@ def test_too_little_is_left():
     assert np.isinf(found).all()
 
 
-@pytest.mark.parametrize(("a", "b"), [(1.0, 0.0), (0.3, 25.0)])
-def test_double_integral(a, b):
-    """A sum over 800 points of an edge of 9 px, correlated over 1.2 px; the weight is the least-squares line's."""
-    length, middle, scale = 9.0, 6.0, 1.2
+@pytest.mark.parametrize("spans", [1.8, 4.0, 9.9])  # smoothing scales that the edge is long
+@pytest.mark.parametrize(("a", "b"), WANTED)
+def test_a_short_edge(spans, a, b):
+    """The nine points themselves, at a contrast that changes by a third; dense ones are 0.3 to 9 % off."""
+    length, middle = SCALE * spans, 6.0
+
+    def sigma(t):
+        return 1 / (1 + 0.3 * t / length)
+
     n = nodes(length, middle)
-    t = length * ((np.arange(800) + 0.5) / 800 - 0.5)
-    design = np.column_stack([np.ones(800), t + middle]) * (length / 800)
-    weight = np.linalg.solve(design.T @ np.column_stack([np.ones(800), t + middle]), design.T).T @ [a, b]
-    # per point; the closed weight is per px
-    kernel = np.exp(-((t[:, None] - t) ** 2) / (4 * scale**2))
-    expected = weight @ kernel @ weight
-    g = line_weight(n, np.array([a]), np.array([b]))
-    assert _double_integral(g, n.t, n.length, scale)[0] == pytest.approx(expected, rel=1e-4)
+    weight = line_weight(n, np.array([a]), np.array([b])) * sigma(n.t)
+    assert _sum_of_points(weight, n.length, SCALE)[0] == pytest.approx(of_points(length, middle, a, b, sigma), rel=1e-9)
 
 
-@pytest.mark.parametrize("spans", [10.0, 14.0, 40.0])  # smoothing scales that the edge is long
-@pytest.mark.parametrize(("a", "b"), [(1.0, 0.0), (0.0, 30.0), (0.3, -25.0)])
+def long(length, middle, a, b):
+    n, a, b = nodes(length, middle), np.array([a]), np.array([b])
+    return long_edge(n, line_weight(n, a, b), line_slope(n, a, b), SCALE)[0].sum()
+
+
+@pytest.mark.parametrize("spans", [10.0, 14.0, 17.0, 25.0, 41.0, 201.0])
+@pytest.mark.parametrize(("a", "b"), WANTED)
 def test_a_long_edge(spans, a, b):
-    """A sum over 4000 correlated points; without the slope's own term the tilt's variance would be 1.3 % too low."""
-    scale, length = 1.2, 1.2 * spans
-    n, a, b = nodes(length, 0.4 * length), np.array([a]), np.array([b])
-    t = length * ((np.arange(4000) + 0.5) / 4000 - 0.5)
-    weight = np.interp(t, n.t[0], line_weight(n, a, b)[0]) * length / 4000
-    expected = weight @ np.exp(-((t[:, None] - t) ** 2) / (4 * scale**2)) @ weight
-    found = long_edge(n, line_weight(n, a, b), line_slope(n, a, b), scale)[0].sum()
-    assert found == pytest.approx(expected, rel=1e-5)
+    """Points as far apart as the mean of those lengths; dense ones are 0.2 to 11 % off."""
+    length = SCALE * spans
+    expected = of_points(length, 0.4 * length, a, b)
+    assert long(length, 0.4 * length, a, b) == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize(("a", "b"), WANTED)
+def test_edges_of_any_length(a, b):
+    """Whose points are a whole number: between them the sum leaps about the smooth one."""
+    ratios = [
+        long(length, 0.4 * length, a, b) / of_points(length, 0.4 * length, a, b)
+        for length in SCALE * np.arange(10.0, 60.0, 0.1)
+    ]
+    assert np.ptp(ratios) < 0.05
+    assert np.mean(ratios) == pytest.approx(1, abs=2e-3)

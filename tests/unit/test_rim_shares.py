@@ -7,7 +7,7 @@ import pytest
 
 import scenes
 from imaging.features import rim_look
-from imaging.features.circles import HALF, _at_ends, calibrated_circle, rim
+from imaging.features.circles import HALF, _lacking, calibrated_circle, rim
 from imaging.features.locator import MIN_CONTRAST
 from imaging.features.rim_look import _counted
 from imaging.models.calibrated import kappa2
@@ -75,18 +75,7 @@ def test_what_correlation_lacks_where_shares_change(arc, rng):
         kernel = np.exp(-((at[some, None] - at[some]) ** 2) / 4)
         double = each[some] @ kernel @ each[some] * (arc / fine) ** 2
         lacks = (2 * np.sqrt(np.pi) * (share**2).sum() * arc - double) / 2
-        found = _at_ends(share, np.ones(share.size), np.ones((share.size, 1)), np.full(share.size, arc))[0, 0]
+        found = _lacking(share[:, None], np.full(share.size, arc))[0, 0]
         assert found == pytest.approx(lacks, rel=2e-3)
         if arc < 1:
             assert (np.diff(share) ** 2).sum() != pytest.approx(lacks, rel=0.2)
-
-
-def test_hard_ends_are_those_of_the_points_that_count(rng):
-    """Where points begin or cease to count at once: one of each, around, whatever is not counted."""
-    share = (rng.uniform(size=(5, 40)) < 0.6).astype(float)
-    variance, design = rng.uniform(0.5, 2, share.shape), rng.normal(size=(*share.shape, 3))
-    found = _at_ends(share, variance, design, np.full(share.shape, 0.3))
-    for row, told in enumerate(found):
-        ends = [k if share[row, k] else (k + 1) % 40 for k in range(40) if share[row, k] != share[row, (k + 1) % 40]]
-        expected = sum(variance[row, k] * np.outer(design[row, k], design[row, k]) for k in ends)
-        assert np.allclose(told, expected, rtol=1e-12, atol=1e-12)

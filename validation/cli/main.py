@@ -27,9 +27,11 @@ _came: list[int] = []  # signals: some libraries keep but the text of an error t
 
 def main() -> None:
     """Entry point. Little is loaded before it begins, so that it is in charge when something goes wrong."""
+    from validation.cli.memory import keep_freed
     from validation.cli.streams import make_usable
 
     make_usable()
+    keep_freed()
     code = 3
     try:
         for number in (signal.SIGINT, signal.SIGTERM):

@@ -9,8 +9,10 @@ from numpy.polynomial.legendre import leggauss
 
 from validation.hard.precise import (
     CLEARANCE,
+    FEWEST,
     MIN_CONTRAST,
     MIN_USABLE,
+    SPACING,
     Inputs,
     View,
     contrast,
@@ -162,14 +164,19 @@ def calibrated(scene, inputs: Inputs, adaptive: bool = True, objective: str = "i
             return "low_contrast"
         lever = (length if corner == last else mpf(0)) - middle
 
-        def g2(t):
-            return ((1 + 12 * lever * t / used**2) / used) ** 2 * point_variance / squared(t)
-
         if used < 10 * scale:
-            raise NotImplementedError("an edge shorter than 10 smoothing scales needs the double integral")
-        slope2 = (12 * lever / used**3) ** 2 * point_variance
-        tilted = mpf(8) / 3 * scale**4 * integral(lambda t: slope2 / squared(t)) / used
-        ends = 2 * scale**2 * (g2(-used / 2) + g2(used / 2))
+            raise NotImplementedError("an edge shorter than 10 smoothing scales needs the sum over its points")
+        spacing = used / max(mpf(FEWEST - 1), used / (SPACING * scale) + mpf(1) / 2)
+        slope, step = 12 * lever / (used**3 + 2 * used * spacing**2), (spacing / scale) ** 2
+
+        def g2(t):
+            return (1 / used + slope * t) ** 2 * point_variance / squared(t)
+
+        tilt = (mpf(8) / 3 - step * 2 / 3 + step**2 * 11 / 360) * scale**4
+        tilted = (tilt / used + mp.sqrt(mp.pi) * scale * spacing**2 / 3) * slope**2
+        tilted *= integral(lambda t: point_variance / squared(t))
+        end = 2 + step / 6 - step**2 / 480 - step**3 / 8064
+        ends = end * scale**2 * (g2(-used / 2) + g2(used / 2))
         return 2 * mp.sqrt(mp.pi) * scale * integral(g2) - ends + tilted
 
     return _distance_variance(scene, inputs, offset_variance, objective)
