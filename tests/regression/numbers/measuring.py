@@ -78,7 +78,7 @@ def _boards():
     found = boards()
     camera = measure.calibrate_camera(found, SMALL.square, (240, 320), "k1,k2", 0.01)
     return {"boards": found, "camera": camera, "summary": camera_table.summary(camera, "mm").splitlines(),
-            "covariance": camera_table.covariance_file(camera).splitlines(),
+            "covariance": camera_table.uncertainty_file(camera).splitlines(),
             "lens": camera_table.lens_file(camera).splitlines()}  # fmt: skip
 
 

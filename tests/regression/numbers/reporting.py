@@ -299,7 +299,7 @@ def _camera_told():
             "printed": printed(camera_table.boards(found, seen, "mm"), camera_table.parameters(found)),
             "summary": [camera_table.summary(each, "mm") for each in (found, other)],
             "lens": camera_table.lens_file(found),
-            "covariance": camera_table.covariance_file(found),
+            "covariance": camera_table.uncertainty_file(found),
             "facts": camera_table.facts(found, seen, "mm"),
             "lines": [
                 refused(lambda b=b: camera_table.scene_lines(found, "task1", b)) for b in (None, Path("x/y.json"))
