@@ -148,10 +148,3 @@ def torrance_sparrow(material):
         return np.where(nl > 0, material.specular_fraction * facets * fresnel / (np.pi * nv) + diffuse * nl, 0.0)
 
     return gloss
-
-
-def at_a_place(blur_px: float, scale: float = 1.0) -> float:
-    """Variance of a crossing at one of the places of its profile, half a px apart, over that of the exact second
-    derivative: the cubic through four of them is less steep there."""
-    near, beyond = (np.exp(-(step**2) / (2 * (scale**2 + blur_px**2 + 1 / 12))) for step in (0.5, 1.0))
-    return float(1 / ((4 * near - beyond) / 3) ** 2)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 PIXEL_VARIANCE = 1 / 12  # variance of a uniform distribution one pixel wide, px^2
+STEP = 0.5  # px between the places across an edge at which the second derivative is told
 CLEARANCE = 3.5  # standard deviations of the smoothed edge that a neighbouring edge must keep
 
 MIN_CONTRAST = 5.0  # contrast / noise below which a locator's error is no longer linear in the noise
@@ -36,6 +37,23 @@ def kappa2(scale: float, blur_px):
     8.0
     """
     return 3 / 8 * (1 + (edge_blur(blur_px) / scale) ** 2) ** 3
+
+
+def located_kappa2(scale: float, blur_px):
+    """The same of a crossing by the cubic through places of a profile `STEP` px apart, of an edge at one of them.
+
+    Of f(x) = x exp(-x^2 / (2 (s^2 + s_e^2))) the cubic through four places has the slope (4 f(h) - f(2 h) / 2) / (3 h)
+    at one of them, which is less than f's own: 1.3 % at a scale of 1 px and a blur of 0.6 px. Places are told from
+    where the edge is expected, and it is there.
+
+    Examples
+    --------
+    >>> [round(float(located_kappa2(scale, 0.6) / kappa2(scale, 0.6)), 3) for scale in (1.0, 2.0)]
+    [1.027, 1.003]
+    """
+    width = scale**2 + edge_blur(blur_px) ** 2
+    near, beyond = np.exp(-(STEP**2) / (2 * width)), np.exp(-2 * STEP**2 / width)
+    return kappa2(scale, blur_px) / ((4 * near - beyond) / 3) ** 2
 
 
 def isophote_kappa2(scale: float, blur_px):

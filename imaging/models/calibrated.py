@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from imaging.features.circles import calibrated_circle
-from imaging.features.locator import FEWEST, MIN_CONTRAST, MIN_USABLE, correlation, kappa2, lacking
+from imaging.features.locator import FEWEST, MIN_CONTRAST, MIN_USABLE, correlation, lacking, located_kappa2
 from imaging.features.measurand import normals
 from imaging.light.appearance import is_separable
 from imaging.models.along import NODE_WEIGHTS, NODES, Along, EdgeNodes
@@ -69,7 +69,7 @@ def _calibrated(pictures: Pictures) -> Errors:
         noise, shared = scene.noise, None
         if noise.is_shared:
             shared = of_points(noise, circle.place, circle.normal, circle.arc, circle.blur, scale)
-        return calibrated_circle(circle, kappa2(scale, circle.blur), scale, MIN_CONTRAST**2, shared)
+        return calibrated_circle(circle, located_kappa2(scale, circle.blur), scale, MIN_CONTRAST**2, shared)
 
     return combined(pictures, _quadratic(line_variance, nodes), squared.mean(-1), noise.mean(-1), found)
 
@@ -105,7 +105,7 @@ def _of_shared(pictures: Pictures, along: Along, a: np.ndarray, b: np.ndarray) -
 
 def point_variance(nodes: EdgeNodes, scale: float) -> np.ndarray | float:
     """Variance of an edge point's offset in ideal px at unit noise and unit contrast."""
-    return kappa2(scale, nodes.blur) * np.square(nodes.across)
+    return located_kappa2(scale, nodes.blur) * np.square(nodes.across)
 
 
 def line_weight(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray) -> np.ndarray:

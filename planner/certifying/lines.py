@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.features.locator import FEWEST, MIN_USABLE, PIXEL_VARIANCE, SPACING, lacking, reach
+from imaging.features.locator import FEWEST, MIN_USABLE, PIXEL_VARIANCE, SPACING, STEP, lacking, located_kappa2, reach
 from imaging.geometry.visibility import boundaries
 from imaging.models.along import NODE_WEIGHTS, NODES
 from imaging.models.calibrated import POINT_WEIGHTS, POINTS, SHORT
@@ -184,7 +184,7 @@ class Line:
 
     @cached_property
     def kappa2(self) -> Enclosed | float:
-        """Variance of an edge point at unit contrast and noise, `imaging.features.locator.kappa2`."""
+        """Variance of an edge point at unit contrast and noise, `imaging.features.locator.located_kappa2`."""
         return _kappa2(self.view.scene, self.divisors, self.spatial)
 
     @cached_property
@@ -270,14 +270,27 @@ def _kappa2(scene: Scene, divisors: tuple[Enclosed, Enclosed], spatial: Enclosed
     camera, scale = scene.camera, scene.locator.scale_px
     steady = camera.blur_px**2 + PIXEL_VARIANCE
     if camera.aperture_radius == 0:
-        return 3 / 8 * (1 + steady / scale**2) ** 3
+        return float(located_kappa2(scale, camera.blur_px))
     focus, share = camera.lens.focus or camera.distance, camera.perspective
     near, far = (over.wide() for over in divisors)
     over = near + spatial * (far - near)
     depth = (over - (1 - share) * camera.distance) / share
     radius = (-depth + focus) / over * (camera.aperture_radius * camera.focal_px / float(camera.divisor(focus)))
     ratio = (radius.square() * 0.25 + steady) / scale**2 + 1.0
-    return ratio.of(lambda x: 3 / 8 * x**3, lambda x: 9 / 8 * x**2, rising=True)
+    step = STEP**2 / (2 * scale**2)
+
+    def slope(x):
+        """Of the cubic through a profile at one of its places, over the exact one."""
+        return (4 * np.exp(-step / x) - np.exp(-4 * step / x)) / 3
+
+    def variance(x):
+        return 3 / 8 * x**3 / slope(x) ** 2
+
+    def derivative(x):
+        steeper = 4 * step / (3 * x**2) * (np.exp(-step / x) - np.exp(-4 * step / x))
+        return variance(x) * (3 / x - 2 * steeper / slope(x))
+
+    return ratio.of(variance, derivative, rising=True)
 
 
 def _means(lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

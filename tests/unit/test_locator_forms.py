@@ -10,13 +10,16 @@ from scipy.special import pbdv
 from imaging.features.limb_locator import _cylinder_functions, box_cumulant
 from imaging.features.locator import (
     CLEARANCE,
+    STEP,
     correlation,
     edge_blur,
     information_bound,
     isophote_kappa2,
     kappa2,
+    located_kappa2,
     reach,
 )
+from measure.estimators import crossings
 
 
 def bell(x: float, sigma: float) -> float:
@@ -42,6 +45,20 @@ def test_a_point_s_variance_is_the_noise_s_over_the_slope(scale, blur):
     assert isophote_kappa2(scale, blur) == pytest.approx(squared(bell, scale) * along / bell(0.0, width) ** 2, rel=1e-9)
     assert edge_blur(blur) == pytest.approx(math.sqrt(blur**2 + 1 / 12))
     assert reach(scale, blur) == pytest.approx(CLEARANCE * width)
+
+
+@pytest.mark.parametrize(("scale", "blur"), [(1.0, 0.6), (0.8, 1.7)])
+def test_the_cubic_of_a_profile_is_less_steep_than_what_it_passes_through(scale, blur):
+    """Through four places of the second derivative of a blurred step, which is at one of them; fitted here.
+
+    So a point's error is the larger, which the estimator's own places say, too.
+    """
+    width = math.sqrt(scale**2 + blur**2 + 1 / 12)
+    places = STEP * np.arange(-1, 3)
+    steep = np.polyfit(places, [-x / width**2 * bell(x, width) for x in places], 3)[2]
+    exact = -bell(0.0, width) / width**2
+    assert located_kappa2(scale, blur) == pytest.approx(kappa2(scale, blur) * (exact / steep) ** 2, rel=1e-9)
+    assert crossings.STEP == STEP
 
 
 def test_errors_along_an_edge_correlate_as_the_smoothed_noise():

@@ -22,7 +22,7 @@ from scenes.materials import MATERIALS
 from scenes.measurands.kinds import MEASURANDS
 from scenes.registry import Registry
 from tests.commands import ice
-from tests.oracle import at_a_place, block_image
+from tests.oracle import block_image
 
 KINDS = {
     "spotlight": LIGHTS, "median": measure.ESTIMATORS, "vignetting": EFFECTS, "eccentricity": MEASURANDS,
@@ -135,7 +135,7 @@ def test_a_material_s_lobe_is_rendered_as_it_is_predicted(satin):
     assert (clean - matt)[inside] == pytest.approx((expected - matt)[inside], rel=0.01)  # margin: 1e-3 is measured
     told, found = planner.predict(satin, *GLEAM), measure.propagate(clean, satin, *GLEAM)
     # margin: the renderer's own noise, half a per cent
-    assert found.variance_px2 == pytest.approx(told.variance_px2 * at_a_place(satin.camera.blur_px), rel=0.02)
+    assert found.variance_px2 == pytest.approx(told.variance_px2, rel=0.02)
     assert measure.distance(clean, satin, *GLEAM).value_px == pytest.approx(told.value_px + told.bias_px, abs=3e-3)
 
 

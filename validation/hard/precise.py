@@ -21,6 +21,7 @@ mpf = mp.mpf
 _STEP = 20  # digits: relative step of the derivatives
 MIN_CONTRAST, MIN_USABLE, CLEARANCE, EDGE_ON = 5, 2, mpf("3.5"), mpf("1e-12")  # the planner's documented rules
 FEWEST, SPACING = 9, 2  # edge points, and the smoothing scales between them: the same
+STEP = mpf("0.5")  # px between places across an edge: the same
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from validation.hard.precise import (
     MIN_CONTRAST,
     MIN_USABLE,
     SPACING,
+    STEP,
     Inputs,
     View,
     contrast,
@@ -131,7 +132,9 @@ def calibrated(scene, inputs: Inputs, adaptive: bool = True, objective: str = "i
     scale = mpf(scene.locator.scale_px)
     noise = mpf(scene.noise.sigma) ** 2 + (0 if scene.noise.bits is None else mpf(1) / 12)
     blur2 = mpf(scene.camera.blur_px) ** 2 + mpf(1) / 12
-    point_variance = mpf(3) / 8 * (1 + blur2 / scale**2) ** 3 * noise
+    across = STEP**2 / (2 * (scale**2 + blur2))
+    slope = (4 * mp.exp(-across) - mp.exp(-4 * across)) / 3  # of the cubic through a profile, over the exact one
+    point_variance = mpf(3) / 8 * (1 + blur2 / scale**2) ** 3 / slope**2 * noise
     clear = CLEARANCE * mp.sqrt(scale**2 + blur2)
     out = tuple(x / inputs.distances[0] for x in view.eye)
 
