@@ -260,7 +260,7 @@ def test_a_search_by_bounds_finds_what_is_best_where_levels_are_cut_off(task1, e
 def test_pictures_are_combined_with_the_squares_of_their_weights():
     """Two pictures of unlike scatter and one of them lost at times; the mean error in the object, sigma not squared."""
     ok = SimpleNamespace(status="ok", name="width", unit="cm", value_object=5.0, tolerance=None)
-    views = [SimpleNamespace(sensor=k, light=k, prediction=SimpleNamespace(measurands=(ok,))) for k in (0, 1)]
+    views = [SimpleNamespace(place=k, prediction=SimpleNamespace(measurands=(ok,))) for k in (0, 1)]
     variances = np.array([[[4e-6]], [[1e-6]]])
     both = combined(variances, np.array([["ok"], ["ok"]]), np.zeros((2, 1)))
     assert both.weights.ravel() == pytest.approx([0.2, 0.8])
@@ -270,9 +270,9 @@ def test_pictures_are_combined_with_the_squares_of_their_weights():
     off = SimpleNamespace(
         bias=np.array([3e-4]), u_bias=np.array([1e-4]), beside=np.array([2e-5]), simulated=("ok",)
     )  # fmt: skip
-    shots = {(k, k): views_check._Shot(values[k], variances[k] * (1.2, 0.9)[k], off) for k in (0, 1)}
+    shots = {k: views_check._Shot(values[k], variances[k] * (1.2, 0.9)[k], off) for k in (0, 1)}
     chosen = SimpleNamespace(views=views, combination=both)
-    ((row, joined),) = views_check._rows(None, chosen, shots)
+    ((row, joined),) = views_check._rows(chosen, shots)
     wanted = 0.2 * values[0][0, :, 0] + 0.8 * values[1][0, :, 0]
     good = wanted[np.isfinite(wanted)]
     assert joined[np.isfinite(joined)] == pytest.approx(good)

@@ -7,7 +7,7 @@ import pytest
 
 import planner
 import scenes
-from imaging.features.locator import correlation, kappa2, points_along
+from imaging.features.locator import correlation, located_kappa2, points_along
 from imaging.features.projected_edges import projected_edges
 from imaging.features.propagation import corner_covariance
 from imaging.geometry.projection import edge_points, project
@@ -153,7 +153,7 @@ def test_calibrated_against_the_explicit_covariance_of_points(task1, focal):
         counted = np.concatenate([[0.5], np.ones(s.size - 2), [0.5]]) / (s.size - 1)
         centred = s - s.mean()
         influence = counted * (1 + ((corner - start) @ along - s.mean()) * centred / (counted @ centred**2))
-        weighted = influence * np.sqrt(kappa2(0.8, scene.camera.blur_px) * scene.noise.variance) / steps
+        weighted = influence * np.sqrt(located_kappa2(0.8, scene.camera.blur_px) * scene.noise.variance) / steps
         offsets.append(weighted @ correlation(s[:, None] - s, 0.8) @ weighted)
     directions = view.ends[:, 1] - view.ends[:, 0]
     normals = np.column_stack([-directions[:, 1], directions[:, 0]]) / view.lengths[:, None]

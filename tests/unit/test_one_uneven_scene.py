@@ -249,7 +249,9 @@ def test_predicted_variances_are_those_of_points(scene, picture):
     pictures = Pictures.of(flat, SENSOR, LIGHTS)
     view = planner.projected_edges(pictures)
     scale = flat.locator.scale_px
-    kappa = 3 / 8 * (1 + (0.7**2 + 1 / 12) / scale**2) ** 3
+    width2 = scale**2 + 0.7**2 + 1 / 12
+    cubic = (4 * np.exp(-0.125 / width2) - np.exp(-0.5 / width2)) / 3  # its slope at a place of the profile
+    kappa = 3 / 8 * (width2 / scale**2) ** 3 / cubic**2
     scatter, lines = np.zeros((2 * len(view.names),) * 2), []
     for i, name in enumerate(view.names):
         start, stop = view.ends[i]

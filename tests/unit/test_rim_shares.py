@@ -10,7 +10,7 @@ from imaging.features import rim_look
 from imaging.features.circles import HALF, _lacking, calibrated_circle, rim
 from imaging.features.locator import MIN_CONTRAST
 from imaging.features.rim_look import _counted
-from imaging.models.calibrated import kappa2
+from imaging.features.locator import kappa2
 from imaging.pictures import Pictures
 from tests.oracle import pinhole
 

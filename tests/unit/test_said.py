@@ -217,7 +217,8 @@ def test_each_picture_of_a_set_is_drawn(monkeypatch, tmp_path, count):
 
     monkeypatch.setattr(views_figure, "draw_seen", seen)
     monkeypatch.setattr(views_figure, "save", lambda figure, path: kept.append(figure) or path)
-    views = [SimpleNamespace(sensor=Pose(10 + k, 20), light=Pose(30, 40 + k)) for k in range(count)]
+    picture = SimpleNamespace(scene=None)
+    views = [SimpleNamespace(sensor=Pose(10 + k, 20), light=Pose(30, 40 + k), picture=picture) for k in range(count)]
     used = np.array([[True, False, True], [False, False, False]])[:count]
     last = SimpleNamespace(views=views, combination=SimpleNamespace(used=used))
     scene = SimpleNamespace(quantities=[SimpleNamespace(name=name) for name in ("slot", "lean", "step")])

@@ -126,7 +126,8 @@ def test_outputs_may_lie_in_folders_that_do_not_exist_yet_and_in_those_that_do(t
     monkeypatch.setattr(RunFile, "reopen", given(campaign=lambda: None, close=lambda: None))
     monkeypatch.setattr(sweep, "sweep", given(to_json=dict))
     found = SimpleNamespace(picture=SimpleNamespace(scene=SimpleNamespace(name="a", title="")))
-    view = SimpleNamespace(views=[SimpleNamespace(sensor=None, light=None)], combination=SimpleNamespace(used=[[]]))
+    shown = SimpleNamespace(sensor=None, light=None, picture=SimpleNamespace(scene=None))
+    view = SimpleNamespace(views=[shown], combination=SimpleNamespace(used=[[]]))
     several = SimpleNamespace(scene=SimpleNamespace(quantities=[]), sets=[view])
     correction = given(
         **dict.fromkeys(each.name for each in fields(Correction)) | {"simulated": ()},
