@@ -8,9 +8,8 @@ import pytest
 import scenes
 from imaging.features import rim_look
 from imaging.features.circles import HALF, _lacking, calibrated_circle, rim
-from imaging.features.locator import MIN_CONTRAST
+from imaging.features.locator import MIN_CONTRAST, kappa2
 from imaging.features.rim_look import _counted
-from imaging.features.locator import kappa2
 from imaging.pictures import Pictures
 from tests.oracle import pinhole
 
