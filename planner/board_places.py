@@ -28,6 +28,7 @@ from planner.search.objective import DEFAULT_OVER, Aim, minimised
 from scenes import Board, InvalidInput, Picture, Pose, Scene
 from scenes.board import PITCH
 from scenes.placement import limits
+from scenes.pose import one_or_all
 from scenes.uncertain import UncertainNumber
 
 _PLACES = 33  # of the middle, along each side of what is seen of the plane
@@ -89,8 +90,7 @@ class BoardPlan:
     @property
     def light(self) -> Pose | tuple[Pose, ...]:
         """Pose of the free light, or of each."""
-        free = self.picture.free_lights
-        return free[0] if len(free) == 1 else free
+        return one_or_all(self.picture.free_lights)
 
 
 def place_board(

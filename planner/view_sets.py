@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from planner.combining import Combination
-from planner.design import DEFAULT_HOLD, Choice, Hold, Vary
+from planner.design import DEFAULT_HOLD, Choice, Hold, Vary, exposure_time, own_choice
 from planner.prediction import Prediction
 from scenes import Picture, Pose, Scene
 from scenes.results import Shown, finite, poses
@@ -152,6 +152,11 @@ class Views(Shown):
     vary: tuple[Vary, ...] | None = None
     hold: Hold = DEFAULT_HOLD
     own: tuple[ViewSet, ...] | None = None
+
+    def choice(self, view: View) -> tuple[Choice, float]:
+        """What stands before lens and lamp in one of the pictures, and how much longer it is exposed for it."""
+        choice = view.choice or own_choice(self.scene)
+        return choice, exposure_time(self.scene, choice, self.hold)
 
     def over_own(self, index: int) -> float | None:
         """How many times as large what is minimised is by the scene's own choice, of the index-th set; None where that

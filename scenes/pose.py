@@ -110,3 +110,12 @@ def several(lights: Any) -> tuple[Any, ...]:
         return (lights,)
     nested = all(isinstance(part, Pose) or (isinstance(part, Iterable) and not isinstance(part, str)) for part in parts)
     return parts if nested else (lights,)
+
+
+def one_or_all(poses: tuple[Pose, ...]) -> Pose | tuple[Pose, ...]:
+    """One pose itself, several as they are: of free lights as a caller gives them, which `several` makes alike.
+
+    >>> one_or_all((Pose(15, 315),)), one_or_all(())
+    (Pose(polar_deg=15.0, azimuth_deg=315.0), ())
+    """
+    return poses[0] if len(poses) == 1 else poses

@@ -51,9 +51,12 @@ def located_kappa2(scale: float, blur_px):
     >>> [round(float(located_kappa2(scale, 0.6) / kappa2(scale, 0.6)), 3) for scale in (1.0, 2.0)]
     [1.027, 1.003]
     """
-    width = scale**2 + edge_blur(blur_px) ** 2
-    near, beyond = np.exp(-(STEP**2) / (2 * width)), np.exp(-2 * STEP**2 / width)
-    return kappa2(scale, blur_px) / ((4 * near - beyond) / 3) ** 2
+    return kappa2(scale, blur_px) / cubic_slope(scale**2 + edge_blur(blur_px) ** 2) ** 2
+
+
+def cubic_slope(width2):
+    """Slope of that cubic over the exact one, of an edge whose blur and smoothing have this variance together, px^2."""
+    return (4 * np.exp(-(STEP**2) / (2 * width2)) - np.exp(-2 * STEP**2 / width2)) / 3
 
 
 def isophote_kappa2(scale: float, blur_px):

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imaging.features.locator import STEP
 from measure.features.lines import trend_along
 from measure.features.points import DECIDED, EdgePoints
 
-STEP = 0.5  # px between the places across the edge
 _NEAR = 3  # places on each side within which an edge is brighter on one side, whatever lies beside it
 _CERTAIN = 4.0  # standard deviations of the function by noise that a point is from being another: it counts as a whole
 _DIFFERENCE = 0.01  # standard deviations of the function by noise

@@ -15,7 +15,17 @@ from functools import cached_property
 
 import numpy as np
 
-from imaging.features.locator import FEWEST, MIN_USABLE, PIXEL_VARIANCE, SPACING, STEP, lacking, located_kappa2, reach
+from imaging.features.locator import (
+    FEWEST,
+    MIN_USABLE,
+    PIXEL_VARIANCE,
+    SPACING,
+    STEP,
+    cubic_slope,
+    lacking,
+    located_kappa2,
+    reach,
+)
 from imaging.geometry.visibility import boundaries
 from imaging.models.along import NODE_WEIGHTS, NODES
 from imaging.models.calibrated import POINT_WEIGHTS, POINTS, SHORT
@@ -279,16 +289,12 @@ def _kappa2(scene: Scene, divisors: tuple[Enclosed, Enclosed], spatial: Enclosed
     ratio = (radius.square() * 0.25 + steady) / scale**2 + 1.0
     step = STEP**2 / (2 * scale**2)
 
-    def slope(x):
-        """Of the cubic through a profile at one of its places, over the exact one."""
-        return (4 * np.exp(-step / x) - np.exp(-4 * step / x)) / 3
-
     def variance(x):
-        return 3 / 8 * x**3 / slope(x) ** 2
+        return 3 / 8 * x**3 / cubic_slope(scale**2 * x) ** 2
 
     def derivative(x):
         steeper = 4 * step / (3 * x**2) * (np.exp(-step / x) - np.exp(-4 * step / x))
-        return variance(x) * (3 / x - 2 * steeper / slope(x))
+        return variance(x) * (3 / x - 2 * steeper / cubic_slope(scale**2 * x))
 
     return ratio.of(variance, derivative, rising=True)
 

@@ -11,8 +11,8 @@ import numpy as np
 from planner.design import Choice, Hold, angles_of, bands_of, own_choice, with_choice
 from planner.search.candidates import SettingUp
 from planner.search.grid import Grid
-from planner.search.objective import Report, SearchProblem, cut_off
-from planner.search.pool import Pool, World, information
+from planner.search.objective import Report
+from planner.search.pool import Pool, World, fast_table
 from planner.search.sets import alone, undominated
 from planner.search.varying import ANGLE_STEP, BANDS_WITH
 
@@ -41,7 +41,7 @@ def join_turned(pool: Pool, rows: set[int], vary: tuple[str, ...], hold: Hold, s
         poses = pool.poses[row][None]
         for choice in _turned(pool.world(row).choice or own_choice(scene), vary, step_deg):
             world = _world(pool, choice, hold)
-            pool.join(world, poses, _told(world.problem, poses[:, :2], poses[:, 2:])[0])
+            pool.join(world, poses, _told(world, poses[:, :2], poses[:, 2:])[0])
 
 
 def _turned(choice: Choice, vary: tuple[str, ...], step_deg: float) -> Iterator[Choice]:
@@ -54,7 +54,7 @@ def _turned(choice: Choice, vary: tuple[str, ...], step_deg: float) -> Iterator[
 def _joined(pool: Pool, choice: Choice, hold: Hold, grid: Grid) -> float:
     """Its candidates in the pool; what is minimised of the best of them alone."""
     world = _world(pool, choice, hold)
-    told = _told(world.problem, grid.sensors, grid.lights)
+    told = _told(world, grid.sensors, grid.lights)
     s, k = np.unravel_index(undominated(told, pool.aim), told.shape[:2])
     pool.join(world, np.concatenate([grid.sensors[s], grid.lights[k]], 1), told[s, k])
     return float(alone(told, pool.aim).min())
@@ -66,11 +66,6 @@ def _world(pool: Pool, choice: Choice, hold: Hold) -> World:
     return World(choice, SettingUp(replace(ways.problem, scene=scene), ways.held))
 
 
-def _told(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
-    """Information of all pairs of sensors (S, 2) and lights (L, 2), (S, L, M); 0 where one is not feasible, or where
-    levels are cut off, for what is cut off scatters less and every measurement of it is biased."""
-    told = np.empty((len(sensors), len(lights), len(problem.scene.quantities)))
-    for part, errors, allowed in problem.table(sensors, lights, lambda *_: None):
-        good = allowed & ~cut_off(errors, problem.scene)
-        told[part] = information(errors.variances_object, problem.objective) * good[..., None]
-    return told
+def _told(world: World, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
+    """Information of all pairs of sensors (S, 2) and lights (L, 2), (S, L, M)."""
+    return fast_table(world.problem, sensors, lights, lambda *_: None, uncut=True)

@@ -16,6 +16,7 @@ from planner.constraints import WHOLE, Constraints
 from scenes import InvalidInput, Pose, Scene, several
 from scenes.arrays import finite, number
 from scenes.errors import given
+from scenes.pose import one_or_all
 
 
 def distinct(items: Iterable[T], differ: Callable[[T, T], bool], most: int) -> Iterator[T]:
@@ -37,8 +38,7 @@ def by_light(lights: np.ndarray) -> np.ndarray | tuple[np.ndarray, ...]:
 
 def as_poses(lights: np.ndarray) -> Pose | tuple[Pose, ...]:
     """One setting's lights (2 F,): the pose of the one free light, else a tuple of such."""
-    found = tuple(Pose(*map(float, lights[i : i + 2])) for i in range(0, lights.size, 2))
-    return found[0] if len(found) == 1 else found
+    return one_or_all(tuple(Pose(*map(float, lights[i : i + 2])) for i in range(0, lights.size, 2)))
 
 
 def as_array(lights: Pose | tuple[Pose, ...]) -> np.ndarray:

@@ -16,7 +16,7 @@ from planner.search.candidates import SettingUp
 from planner.search.grid import Grid, as_poses
 from planner.search.lights import best_lights
 from planner.search.local import refine
-from planner.search.objective import Aim, Report, SearchProblem
+from planner.search.objective import Aim, Report, SearchProblem, cut_off
 from planner.search.sets import PictureInformation, better
 from scenes.status import is_trusted
 
@@ -30,11 +30,15 @@ def information(variances: np.ndarray, aim: Aim) -> np.ndarray:
         return np.where(np.isfinite(variances), 1 / (variances * aim.shares), 0.0)
 
 
-def fast_table(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> np.ndarray:
-    """Information of every pair of sensors (S, 2) and lights (L, 2), shape (S, L, M); 0 where not feasible."""
+def fast_table(
+    problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report, *, uncut: bool = False
+) -> np.ndarray:
+    """Information of every pair of sensors (S, 2) and lights (L, 2), shape (S, L, M); 0 where not feasible, and, asked
+    for ``uncut``, where levels are cut off: what is cut off scatters less, and every measurement of it is biased."""
     told = np.empty((len(sensors), len(lights), len(problem.scene.quantities)))
     for part, errors, allowed in problem.table(sensors, lights, report):
-        told[part] = information(errors.variances_object, problem.objective) * allowed[..., None]
+        good = allowed & ~cut_off(errors, problem.scene) if uncut else allowed
+        told[part] = information(errors.variances_object, problem.objective) * good[..., None]
     return told
 
 

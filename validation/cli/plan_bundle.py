@@ -9,6 +9,7 @@ import typer
 
 import scenes
 from planner.views import MOST_VIEWS
+from scenes.pose import one_or_all
 from scenes.results import picked
 from scenes.status import legend
 from validation.cli.common import check_left_out, progress, say
@@ -72,17 +73,13 @@ def facts(found: planner.BundlePlan, seconds: float) -> dict[str, Any]:
     })  # fmt: skip
 
 
-def _light(picture: scenes.Picture) -> tuple[Any, ...]:
-    """The free light's pose, or all of them."""
-    free = picture.free_lights
-    return scenes.pairs(free[0] if len(free) == 1 else free)
-
-
 def _set(each: planner.BundleSet) -> dict[str, Any]:
     told = each.prediction
     return {
         "count": len(each.pictures),
-        "poses": [{"sensor": list(one.sensor), "light": _light(one)} for one in each.pictures],
+        "poses": [
+            {"sensor": list(one.sensor), "light": scenes.pairs(one_or_all(one.free_lights))} for one in each.pictures
+        ],
         **picked(each, "is_plan", "minimised", "worst_ratio", "limiting"),
         "lost": list(each.lost),
         "hard": list(each.hard),

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import typer
 
 import scenes
-from planner.design import exposure_time, own_choice
 from planner.views import MOST_VIEWS
 from scenes.results import picked
 from validation.cli.common import check_left_out, progress, say
@@ -114,11 +113,8 @@ def _place(found: planner.Views, view: planner.View) -> dict:
     told = {"sensor": list(view.sensor), "light": scenes.pairs(view.light)}
     if not found.vary:
         return told
-    choice = view.choice or own_choice(found.scene)
-    return told | {
-        "choice": dataclasses.asdict(choice),
-        "exposure_time": exposure_time(found.scene, choice, found.hold),
-    }
+    choice, longer = found.choice(view)
+    return told | {"choice": dataclasses.asdict(choice), "exposure_time": longer}
 
 
 def _measurand(each: planner.ViewSet, m: int) -> dict:

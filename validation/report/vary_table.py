@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner import Chosen, Plan, Varied, View, Views
-from planner.design import Choice, exposure_time, own_choice
+from planner.design import Choice
 from scenes.results import picked
 from validation.report.cells import pose as _pose
 from validation.report.cells import table as _table
@@ -138,8 +138,7 @@ def _check(checked: VaryCheck) -> dict:
 
 def of_view(found: Views, view: View) -> list[str]:
     """The same of one of several pictures."""
-    choice = view.choice or own_choice(found.scene)
-    return of_choice(choice, exposure_time(found.scene, choice, found.hold))
+    return of_choice(*found.choice(view))
 
 
 def angle(value: float | None) -> str:
