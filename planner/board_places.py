@@ -33,7 +33,7 @@ from scenes.uncertain import UncertainNumber
 
 _PLACES = 33  # of the middle, along each side of what is seen of the plane
 _SCALES = (0.5, 0.7, 1.0, 1.4, 2.0)  # of the squares' side
-_COUNTS = (3, 4, 5, 6, 8, 10, 13, 17, 22)  # of inner corners, or dots, along a side
+_COUNTS = (3, 4, 5, 6, 8, 10, 13, 17, 22)  # of inner corners, dots or markers, along a side
 _LEAST_SQUARE = 16.0  # px: what is found without a start
 _HALVINGS = 3  # of the grid's step, when the best is moved
 
@@ -309,8 +309,8 @@ def _sides(outlines: np.ndarray) -> np.ndarray:
 
 
 def _middle(board: Board) -> np.ndarray:
-    """Of its points, (3,)."""
-    return board.at((np.array(board.shape) - 1) / 2)
+    """Of its outline, (3,)."""
+    return board.at(board.outer.mean(0))
 
 
 def _about(board: Board, middle: np.ndarray) -> Board:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, KDTree
 from scipy.spatial.transform import Rotation
 
 from imaging.geometry.projection import project_ideal
@@ -17,6 +17,9 @@ from tests import placements as parts
 CAMERA = {"width": 352, "height": 400, "look_at": [0, 16, 6]}
 """Of `tests.placements`, with room for a board behind the part."""
 
+_POINTS = {"shape": [9, 5], "pitch": {"value": 4.0, "sd": 2e-4}, "corner": [-16.0, 42.0, 0.0]}
+_TAGS = {"shape": [4, 2], "pitch": {"value": 9.0, "sd": 4.5e-4}, "corner": [-17.0, 39.5, 0.0], "marker": 7.0,
+         "dictionary": "DICT_APRILTAG_16h5"}  # fmt: skip
 _WHOLE = np.array([0.6, 0.6, 1, 1, 1, 1])  # of `tests.placements.MOST`
 
 
@@ -29,13 +32,11 @@ class Printed(Board):
     off: tuple[tuple[float, ...], ...] = ()
 
     def at(self, places: np.ndarray) -> np.ndarray:
-        """Points of places; those of a chessboard's inner corners, or of a dot, with their own errors."""
-        columns, rows = self.shape
-        points, near = super().at(places), np.rint(np.asarray(places, float)).astype(int)
-        inner = ((near >= 0) & (near < [columns, rows])).all(-1)
-        close = np.abs(places - near).max(-1) < (1e-9 if self.kind == "chessboard" else 0.45)
-        number = np.where(inner & close, near[..., 1] * columns + near[..., 0], len(self.off))
-        points = points + np.concatenate([np.array(self.off).reshape(-1, 3), np.zeros((1, 3))])[number]
+        """Points of places; those of corners, or of a dot, with their own errors."""
+        near = 0.45 if self.kind in ("dots", "charuco") else 1e-9
+        number = KDTree(self.places).query(places, p=np.inf, distance_upper_bound=near)[1]
+        errors = np.concatenate([np.reshape(self.off, (-1, 3)), np.zeros((1, 3))])
+        points = super().at(places) + errors[np.minimum(number, len(self.off))]
         turn, pivot = Rotation.from_rotvec(self.turn_deg, degrees=True), np.array(self.pivot)
         flat = turn.apply((points - pivot).reshape(-1, 3)).reshape(points.shape)
         return flat + pivot + np.array(self.shift)
@@ -43,8 +44,7 @@ class Printed(Board):
 
 def scene(folder: Any, name: str, kind: str = "chessboard", **changes: Any) -> Scene:
     """One of the three parts with a board behind it: known to `tests.placements.MOST` before."""
-    board = {"kind": kind, "shape": [9, 5], "pitch": {"value": 4.0, "sd": 2e-4}, "corner": [-16.0, 42.0, 0.0],
-             "point_sd": 0.002}  # fmt: skip
+    board = {"kind": kind, **(_TAGS if kind == "markers" else _POINTS), "point_sd": 0.002}
     made = parts.scene(folder, name, camera=CAMERA).with_(
         placement={"from": "board", "board": board, "datums": [], "datum_sd": None},
         uncertainty={"board_shift": 0.003, "board_tilt_deg": 0.005},

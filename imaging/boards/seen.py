@@ -18,7 +18,7 @@ from imaging import sensor
 from imaging.boards.dot_fitting import dot_expected, dot_reach
 from imaging.boards.fitting import crossing_rows
 from imaging.boards.saddle import response
-from imaging.boards.windows import Marked, windows
+from imaging.boards.windows import Marked, Windows, wedges, windows
 from imaging.boards.windows import steps as ways
 from imaging.features.displaced import points_by_deviations
 from imaging.features.seen import Seen
@@ -128,7 +128,7 @@ def _noise(pictures: Pictures, board: Board) -> np.ndarray:
     share, noise = _contrast(pictures, board)
     with np.errstate(divide="ignore", invalid="ignore"):
         size = noise / share**2
-    unit = back @ _unit(pictures, board, places)[..., None, :, :] @ np.swapaxes(back, -1, -2)
+    unit = back @ _unit(pictures, board, places) @ np.swapaxes(back, -1, -2)
     found = size[..., None, None] * unit
     there = _inside(places, camera) & _apart(pictures, board)[..., None]
     good = np.isfinite(found).all((-1, -2)) & (share > 0) & there
@@ -194,27 +194,29 @@ def apart(outline: np.ndarray, part: np.ndarray) -> np.ndarray:
 
 
 def _unit(pictures: Pictures, board: Board, places: np.ndarray) -> np.ndarray:
-    """Covariance (..., 2, 2) of a point in the board's middle for unit noise and unit contrast, recorded px^2.
+    """Covariance of points for unit noise and unit contrast, recorded px^2: (..., 1, 2, 2), or (..., n, 2, 2) of n
+    corners of markers.
 
-    All of a board's points are taken to be seen as that one: what differs from end to end is alike on both sides of
-    it. Infinite where there is no room.
+    All of a board's points are taken to be seen as that in its middle, or as the four of the marker there: what differs
+    from end to end is alike on both sides of it. Infinite where there is no room.
     """
-    columns, rows = board.shape
-    grids = places.reshape(*places.shape[:-2], rows, columns, 2)
-    y, x = rows // 2, columns // 2
+    camera, lead = pictures.scene.camera, places.shape[:-2]
+    grids = places.reshape(*lead, *board.laid, 2)
+    y, x = (count // 2 for count in board.laid[:2])
+    middle = (y, x, *(0 for _ in board.laid[2:]))
+    away = depth(board.points.reshape(*board.laid, 3)[middle][None], pictures.sensors, camera)[..., 0]
+    blur = np.broadcast_to(blur_at(camera, away, grids[(..., *middle, slice(None))]), lead)
+    if board.kind == "markers":
+        gap, cell = (1 - board.share) / board.share, 1 / board.cells
+        each = [wedge(grids[i][y, x], float(blur[i]), gap, cell) for i in np.ndindex(*lead)]
+        return np.tile(np.reshape(each, (*lead, 4, 2, 2)), (board.markers, 1, 1))
     grids = grids[..., y - 1 : y + 2, x - 1 : x + 2, :]
-    middle = board.points.reshape(rows, columns, 3)[y, x]
-    camera = pictures.scene.camera
-    away = depth(middle[None], pictures.sensors, camera)[..., 0]
-    blur = np.broadcast_to(blur_at(camera, away, grids[..., 1, 1, :]), grids.shape[:-3])
-    found = np.empty((*grids.shape[:-3], 2, 2))
-    for index in np.ndindex(*grids.shape[:-3]):
-        args = grids[index], float(blur[index])
-        if board.kind == "dots":
-            found[index] = dot(*args, board.radius / board.pitch)
-        else:
-            found[index] = crossing(*args, marked_beside(board, x + y))
-    return found
+    if board.kind == "dots":
+        each = [dot(grids[i], float(blur[i]), board.radius / board.pitch) for i in np.ndindex(*lead)]
+    else:
+        marked = marked_beside(board, x + y)
+        each = [crossing(grids[i], float(blur[i]), marked) for i in np.ndindex(*lead)]
+    return np.reshape(each, (*lead, 1, 2, 2))
 
 
 def marked_beside(board: Board, skipped: int = 0) -> Marked | None:
@@ -234,14 +236,38 @@ def crossing(grid: np.ndarray, blur: float, marked: Marked | None = None) -> np.
     around = int(_MARGIN) + 2
     here = grid - np.rint(grid[1, 1]) + around
     window = windows(np.zeros((2 * around + 1, 2 * around + 1)), here, marked, blur).some(np.array([4]))
-    if not window.room[0]:
-        return np.full((2, 2), np.inf)
-    toward = ways(here)[1, 1]
-    shape = np.array([[*here[1, 1], *np.arctan2(toward[:, 1], toward[:, 0]), np.log(blur)]])
-    signs = response(window.places, shape, np.zeros((1, 2))).signs[..., 2]
-    window.levels[:] = np.where(window.there, signs / 2, 0.0)
-    rows = crossing_rows(window, shape, np.zeros((1, 2)))[0]
-    return rows @ rows.T
+    return _fitted(window, here[None, 1, 1], ways(here)[None, 1, 1], blur, np.array([[0.0, 0.0, 0.5]]))[0]
+
+
+def wedge(quad: np.ndarray, blur: float, gap: float, cell: float) -> np.ndarray:
+    """The same (4, 2, 2) of a dark marker's corners (2, 2, 2), px; ``gap`` and ``cell`` as of `windows.wedges`."""
+    if not np.isfinite(quad).all():
+        return np.full((4, 2, 2), np.inf)
+    corners = quad.reshape(-1, 2)
+    here = quad - np.rint(corners.min(0)) + int(_MARGIN)
+    size = int(np.ceil(np.ptp(corners, axis=0).max())) + 2 * int(_MARGIN) + 2
+    toward = ways(here).reshape(-1, 2, 2)
+    turn = np.sign(toward[:, 0, 0] * toward[:, 1, 1] - toward[:, 0, 1] * toward[:, 1, 0])
+    inward = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1)])
+    one, other = turn * inward[:, 1], -turn * inward[:, 0]  # sides of both edges on which it is dark
+    window = wedges(np.zeros((size, size)), here[None], gap, cell, blur)
+    return _fitted(window, here.reshape(-1, 2), toward, blur, -np.stack([one, other, one * other], -1) / 4)
+
+
+def _fitted(found: Windows, corners: np.ndarray, toward: np.ndarray, blur: float, parts: np.ndarray) -> np.ndarray:
+    """Covariance (n, 2, 2) of crossings at n corners (n, 2), px, as they are fitted: their edges run (n, 2, 2), their
+    levels are so much (n, 3) of the signs of both edges and of their product."""
+    covariance, room = np.full((len(corners), 2, 2), np.inf), np.flatnonzero(found.room)
+    if not room.size:
+        return covariance
+    some, straight = found.some(room), np.zeros((room.size, 2))
+    angles = np.arctan2(toward[..., 1], toward[..., 0])
+    shape = np.column_stack([corners, angles, np.full(len(corners), np.log(blur))])[room]
+    signs = response(some.places, shape, straight).signs
+    some.levels[:] = np.where(some.there, np.einsum("npk,nk->np", signs, parts[room]), 0.0)
+    rows = crossing_rows(some, shape, straight)
+    covariance[room] = rows @ np.swapaxes(rows, -1, -2)
+    return covariance
 
 
 def dot(grid: np.ndarray, blur: float, share: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.board import numbered
+from scenes.board_print import numbered
 
 _HALF = 0.48  # of the way to the next corner
 _REACH = 12.0  # px from the corner; edges are parabolas so far

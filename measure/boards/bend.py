@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from imaging.boards.windows import steps
-from scenes.board import numbered
+from scenes.board_print import numbered
 
 _DEGREES = ((3, 14), (2, 8))  # of the polynomial, and the corners that it takes
 

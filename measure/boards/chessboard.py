@@ -16,7 +16,7 @@ from measure.boards.bend import bends
 from measure.boards.noise import check_noise, of_board
 from scenes import status
 from scenes.arrays import picture
-from scenes.board import numbered
+from scenes.board_print import numbered
 from scenes.errors import InvalidInput
 
 _FALSE_ALARM = 0.01  # of all corners of a board together
@@ -110,19 +110,19 @@ def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | 
     return measured(image, grid, noise)
 
 
-def check_shape(shape: Any) -> tuple[int, int] | None:
-    """Columns and rows of inner corners, if given.
+def check_shape(shape: Any, of: str = "inner corners", least: int = 3) -> tuple[int, int] | None:
+    """Columns and rows of inner corners, or of something else, if given.
 
     Raises
     ------
     InvalidInput
-        If they are no two whole numbers from 3 to 200.
+        If they are no two whole numbers from ``least`` to 200.
     """
     if shape is None:
         return None
     good = isinstance(shape, tuple | list) and len(shape) == 2 and all(isinstance(n, int | np.integer) for n in shape)
-    if not good or not all(3 <= n <= _MOST for n in shape):
-        raise InvalidInput(f"shape must be columns and rows of inner corners, 3 to {_MOST} each, got {shape!r}")
+    if not good or not all(least <= n <= _MOST for n in shape):
+        raise InvalidInput(f"shape must be columns and rows of {of}, {least} to {_MOST} each, got {shape!r}")
     return int(shape[0]), int(shape[1])
 
 
@@ -167,9 +167,16 @@ class Squares:
         return bends(grid).reshape(-1, 2)
 
 
-def measured(image: np.ndarray, grid: np.ndarray, noise: float | None, layout: Layout = Squares()) -> Board:
+def measured(
+    image: np.ndarray,
+    grid: np.ndarray,
+    noise: float | None,
+    layout: Layout = Squares(),
+    known: np.ndarray | None = None,
+) -> Board:
     """The corners about ``grid``, shape (rows, columns, ..., 2), px, NaN where one is not seen, under white noise of a
-    standard deviation, which the image tells where it is None."""
+    standard deviation, which the image tells where it is None; the corners tell how edges bend, where that is not
+    ``known``, (n, 2), 1/px."""
     columns, rows = grid.shape[1::-1]
     toward = layout.steps(grid)
     shape = _started(grid, toward)
@@ -180,7 +187,7 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float | None, layout: L
         room = found.room
         if not room.any():
             return _named(_nothing((columns, rows), of_board(image, noise), len(room)), seen)
-        some, bend = found.some(room), layout.bends(grid)[room] * (turn > 0)
+        some, bend = found.some(room), (layout.bends(grid) * (turn > 0) if known is None else known)[room]
         fitted = fit_crossings(some, shape[room], bend, _FINE if turn else _ROUGH)
         away = np.linalg.norm(fitted.shape[:, :2] - shape[room, :2], axis=1)
         fitted = replace(fitted, converged=fitted.converged & (away < near[room]))
@@ -194,10 +201,14 @@ def measured(image: np.ndarray, grid: np.ndarray, noise: float | None, layout: L
     return _named(_board((columns, rows), room, fitted, noise, _clipped(image, some)), seen)
 
 
-def respond(image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = Squares()) -> sparse.csr_array:
-    """Derivatives of all coordinates x, y, x, ... of a board's corners by the image's pixels, (2 n, height * width).
+def respond(
+    image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = Squares(), known: np.ndarray | None = None
+) -> sparse.csr_array:
+    """Derivatives of all coordinates x, y, x, ... of a board's corners by the image's pixels, (2 n, height * width),
+    edges' bends, ``known`` or as the corners tell them, held.
 
-    ``grid``, shape (rows, columns, 2), px, says about where corners are that are not measured; their rows are empty.
+    ``grid``, shape (rows, columns, ..., 2), px, says about where corners are that are not measured; their rows are
+    empty.
     """
     n = len(board.corners)
     grid = np.where(np.isfinite(board.corners), board.corners, grid.reshape(n, 2)).reshape(grid.shape)
@@ -205,7 +216,7 @@ def respond(image: np.ndarray, board: Board, grid: np.ndarray, layout: Layout = 
     which = np.flatnonzero(found.room & board.measured)
     if not which.size:
         return sparse.csr_array((2 * n, image.size))
-    some, bend = found.some(which), layout.bends(grid)[which]
+    some, bend = found.some(which), (layout.bends(grid) if known is None else known)[which]
     rows = crossing_rows(some, fit_crossings(some, _started(grid, layout.steps(grid))[which], bend, _FINE).shape, bend)
     x, y = np.where(some.there[..., None], some.places, 0).astype(int).transpose(2, 0, 1)
     column = np.broadcast_to((y * image.shape[1] + x)[:, None], rows.shape)

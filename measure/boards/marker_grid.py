@@ -15,7 +15,7 @@ from measure.boards.chessboard import Board, check_shape, measured
 from measure.boards.noise import check_noise
 from measure.boards.reading import Legible
 from scenes.arrays import picture
-from scenes.board import numbered
+from scenes.board_print import numbered
 from scenes.errors import InvalidInput
 from scenes.markers import read_dictionary
 
@@ -72,7 +72,7 @@ def check_grid(shape: Any, dictionary: Any, marker: Any) -> cv2.aruco.Dictionary
     """
     if shape is None:
         raise InvalidInput("shape must be columns and rows of markers, got none")
-    columns, rows = check_shape(shape)
+    columns, rows = check_shape(shape, "markers", 1)
     check_marker(marker)
     return read_dictionary(dictionary, columns * rows)
 

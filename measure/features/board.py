@@ -24,6 +24,7 @@ from measure.boards import chessboard, dots
 from measure.boards.chessboard import Board as MeasuredBoard
 from measure.boards.chessboard import Squares
 from measure.boards.eccentricity import centroid
+from measure.boards.marker_grid import Markers
 from measure.boards.printed import Printed
 from measure.goodness import WORST
 from scenes import Board, InvalidInput, Picture, status
@@ -76,25 +77,30 @@ def by_board(image: np.ndarray, picture: Picture) -> tuple[np.ndarray | None, fl
         found = _printed(board).measured(image)
     except InvalidInput:
         return None, 0.0
-    grid = found.corners.reshape(*found.shape[::-1], 2)
-    columns, rows = board.shape
-    turned = [np.rot90(each, k) for each in (grid, grid[::-1]) for k in range(4)]
-    turned = [grid[::-1]] if board.kind == "charuco" else turned  # OpenCV numbers its corners from the upper left
-    each = [_nearest(picture, there) for there in turned if there.shape[:2] == (rows, columns)]
+    each = [_nearest(picture, there) for there in _orders(board, found) if there.shape[:-1] == board.laid]
     most = _BEYOND * limits(picture.scene.uncertainty) + 1e-9
     good = [(left, place) for left, place in each if left < _FAR and (np.abs(place[:6]) <= most).all()]
     return (min(good, key=lambda one: one[0])[1] if good else None), float(found.measured.mean())
 
 
+def _orders(board: Board, found: MeasuredBoard) -> list[np.ndarray]:
+    """A board's points as they are found, in the orders that they may have on it, (..., 2): markers, which are numbered
+    from the upper left, leave one."""
+    grid = found.corners.reshape(*found.shape[::-1], *board.laid[2:], 2)
+    if board.has_markers:
+        return [grid[::-1, :, ::-1] if board.kind == "markers" else grid[::-1]]
+    return [np.rot90(each, k) for each in (grid, grid[::-1]) for k in range(4)]
+
+
 def _printed(board: Board) -> Printed:
     """What is printed on a scene's board."""
-    if board.kind != "charuco":
+    if not board.has_markers:
         return Printed(board.kind, board.shape)
     return Printed(board.kind, board.shape, board.dictionary or "", board.share)
 
 
 def _nearest(picture: Picture, grid: np.ndarray) -> tuple[float, np.ndarray]:
-    """Gauss-Newton from where the scene says: what is left between points and recorded places (rows, columns, 2), root
+    """Gauss-Newton from where the scene says: what is left between points and recorded places (..., 2), root
     mean square ideal px, and the placement."""
     free, left = root(picture.scene), np.inf
     here, held = np.zeros(len(free)), _HELD * np.eye(free.shape[1])
@@ -145,9 +151,9 @@ class BoardTool:
 
     @cached_property
     def grid(self) -> np.ndarray:
-        """Where its points are expected to be recorded, px, (rows, columns, 2)."""
-        columns, rows = self.board.shape
-        return project(self.board.points, self._sensor, self.picture.scene.camera).reshape(rows, columns, 2)
+        """Where its points are expected to be recorded, px, (rows, columns, ..., 2)."""
+        found = project(self.board.points, self._sensor, self.picture.scene.camera)
+        return found.reshape(*self.board.laid, 2)
 
     @cached_property
     def _ideal(self) -> np.ndarray:
@@ -179,10 +185,15 @@ class BoardTool:
         """From where they are measured."""
         return self._ellipses if self.board.kind == "dots" else self.grid
 
-    @property
-    def _layout(self) -> tuple[Squares, ...]:
-        """What corners lie beside; nothing of dots."""
-        return () if self.board.kind == "dots" else (Squares(marked_beside(self.board)),)
+    @cached_property
+    def _layout(self) -> tuple[Any, ...]:
+        """How corners lie beside one another, and how their edges bend in the scene's lens; nothing of dots."""
+        board = self.board
+        if board.kind == "dots":
+            return ()
+        layout = Markers(board.share, board.cells, *board.shape) if board.kind == "markers" else None
+        layout = layout or Squares(marked_beside(board))
+        return layout, layout.bends(self.grid)
 
     def points(self, found: MeasuredBoard) -> tuple[np.ndarray, np.ndarray]:
         """How far off its points are, ideal px (n, 2), and their covariance (n, 2, 2), infinite of those not found."""

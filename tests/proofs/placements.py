@@ -173,7 +173,7 @@ def placements(
     places: Annotated[int, typer.Option(help="Places of each part.")] = 334,
     seed: Annotated[int, typer.Option()] = 1,
     only: Annotated[str, typer.Option(help="Parts whose names begin so.")] = "",
-    board: Annotated[str, typer.Option(help="chessboard or dots: they tell the place.")] = "",
+    board: Annotated[str, typer.Option(help="chessboard, dots or markers: they tell the place.")] = "",
     camera: Annotated[str, typer.Option(help="What is estimated of the camera: focal, or with a board focal,k1.")] = "",
     jobs: Annotated[int, typer.Option(help="Processes.")] = 1,
 ) -> None:

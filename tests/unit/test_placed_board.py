@@ -57,7 +57,7 @@ _BOARD = {"shape": [4, 3], "pitch": 5.0, "corner": [0, 50, 0]}
         ({"placement": {"from": "board"}}, "placement.board must be given with placement.from = 'board', got nothing"),
         ({"placement": {"board": _BOARD}}, "placement.board must be left out unless placement.from is board"),
         ({"uncertainty": {"board_shift": 0.1}}, "board_shift and board_tilt_deg must be left out unless"),
-        ({"placement": {"from": "board", "board": {**_BOARD, "shape": [2, 3]}}}, r"shape\[0\] must be at least 3"),
+        ({"placement": {"from": "board", "board": {**_BOARD, "shape": [2, 3]}}}, "shape must be at least 3 both"),
         ({"placement": {"from": "board", "board": {**_BOARD, "normal": [1, 0, 1]}}}, "normal must be across along"),
         ({"placement": {"from": "board", "board": {**_BOARD, "along": [0, 0, 0]}}}, "must be directions, got 0"),
         ({"placement": {"from": "board", "board": {**_BOARD, "dark": 0.9}}}, "dark must be less than bright, 0.8"),

@@ -1,4 +1,4 @@
-"""A ChArUco board beside the part: how it is printed, what its corners tell, where it is found, its render."""
+"""A board with markers beside the part, ChArUco's or tags alone: its print, its corners, where it is found."""
 
 import cv2
 import numpy as np
@@ -17,12 +17,15 @@ from tests import printed
 
 _BOARD = {"kind": "charuco", "dictionary": "DICT_4X4_50", "marker": 3.6, "shape": [5, 3], "corner": [-14, 46, 0],
           "pitch": {"value": 6.0, "sd": 2e-4}}  # fmt: skip
+_TAGS = {"kind": "markers", "dictionary": "DICT_APRILTAG_36h11", "marker": 9.0, "shape": [3, 2], "corner": [-16, 42, 0],
+         "pitch": {"value": 12.0, "sd": 2e-4}}  # fmt: skip
+_CLOCKWISE = [2, 3, 1, 0]  # of a marker's corners, row by row from below: as OpenCV has them
 
 
-@pytest.fixture(scope="module")
-def picture(tmp_path_factory):
+@pytest.fixture(scope="module", params=[_BOARD, _TAGS], ids=["charuco", "markers"])
+def picture(tmp_path_factory, request):
     scene = printed.scene(tmp_path_factory.mktemp("boards"), "block")
-    return Picture.of(scene.with_(placement={"board": _BOARD}), parts.SENSOR, parts.LIGHT)
+    return Picture.of(scene.with_(placement={"board": request.param}), parts.SENSOR, parts.LIGHT)
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +38,13 @@ def tool(picture):
     return BoardTool(picture, measurands(Pictures.of(picture)).placing.board)
 
 
+@pytest.mark.parametrize("kind", ["charuco", "markers"])
 @pytest.mark.parametrize("shape", [(5, 4), (5, 3)])
-def test_bright_and_dark_cover_a_board_once(shape):
-    board = Board(kind="charuco", shape=shape, pitch=3.0, corner=(1, 2, 3), dictionary="DICT_4X4_50", marker=1.8)
+def test_bright_and_dark_cover_a_board_once(kind, shape):
+    board = Board(kind=kind, shape=shape, pitch=3.0, corner=(1, 2, 3), dictionary="DICT_4X4_50", marker=1.8)
     bright, dark = (np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum() / 2
                     for t in board.triangles)  # fmt: skip
-    assert bright + dark == pytest.approx(9 * (shape[0] + 3) * (shape[1] + 3), rel=1e-12)
+    assert bright + dark == pytest.approx(np.prod(board.size), rel=1e-12)
     (x, y), (u, v) = np.moveaxis(board.dark_polygons, -1, 0), np.moveaxis(np.roll(board.dark_polygons, -1, 1), -1, 0)
     assert (x * v - y * u).sum() / 2 * 9 == pytest.approx(dark, rel=1e-12)  # bright cells count against
 
@@ -58,6 +62,24 @@ def test_what_is_printed_is_opencvs_board():
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
         known = cv2.aruco.CharucoBoard((columns + 1, rows + 1), 1.0, 0.6, dictionary)
         np.testing.assert_array_equal(flat, known.generateImage(flat.shape[::-1]))
+
+
+@pytest.mark.parametrize("picture", [_TAGS], indirect=True)
+def test_tags_are_where_opencv_reads_them(clean, tool):
+    """Numbers and corners, to what OpenCV tells them."""
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11))
+    detector.setDetectorParameters(_by_contour())
+    corners, numbers, _ = detector.detectMarkers(np.clip(np.rint(clean), 0, 255).astype(np.uint8))
+    expected = tool.grid.reshape(2, 3, 4, 2)[::-1].reshape(6, 4, 2)[:, _CLOCKWISE]
+    assert sorted(numbers.ravel().tolist()) == list(range(6))
+    for number, four in zip(numbers.ravel(), corners, strict=True):
+        assert np.abs(four[0] - expected[number]).max() < 2  # px; 0.62 found, cells are 4.5 px wide
+
+
+def _by_contour():
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
+    return parameters
 
 
 def test_points_are_as_well_known_as_told(tool, clean):
@@ -95,12 +117,14 @@ def test_a_part_is_found_by_its_board(picture):
 def test_a_render_shows_the_board_of_the_image_model(tmp_path):
     """Mitsuba's triangles against polygons blurred in closed form; a chessboard is another picture."""
     scene = printed.scene(tmp_path, "block", camera={"width": 220, "height": 250, "focal_px": 750.0})
-    small = {"shape": [4, 3], "corner": [-12, 46, 0]}
-    pictures = [Picture.of(scene.with_(placement={"board": board | small}), (25, 290), (30, 40))
-                for board in (_BOARD, {"kind": "chessboard", "pitch": 6.0})]  # fmt: skip
-    made, (drawn, plain) = render.image(pictures[0]), (printed.seen(each, np.zeros(6)) for each in pictures)
-    assert np.abs(made - drawn).max() < 1.0  # of 150 levels; 0.4 found
-    assert np.abs(made - plain).max() > 60  # negative control
+    small, tags = {"shape": [4, 3], "corner": [-12, 46, 0]}, {"shape": [2, 1], "corner": [-11, 44, 0]}
+    pictures = [Picture.of(scene.with_(placement={"board": board}), (25, 290), (30, 40))
+                for board in (_BOARD | small, _TAGS | tags, {"kind": "chessboard", "pitch": 6.0} | small)]  # fmt: skip
+    drawn = [printed.seen(each, np.zeros(6)) for each in pictures]
+    for picture, seen in zip(pictures[:2], drawn, strict=False):
+        made = render.image(picture)
+        assert np.abs(made - seen).max() < 1.0  # of 150 levels; 0.4 found
+        assert np.abs(made - drawn[2]).max() > 60  # negative control
 
 
 @pytest.mark.parametrize(
@@ -112,6 +136,9 @@ def test_a_render_shows_the_board_of_the_image_model(tmp_path):
         ({"dictionary": None}, "dictionary must be one of DICT_4X4_100"),
         ({"shape": [20, 20]}, "dictionary must have the board's 220 markers, got DICT_4X4_50, which has 50"),
         ({"dot_radius": 1.0}, "dot_radius must be left out of a charuco, got 1"),
+        ({"shape": [2, 5]}, r"shape must be at least 3 both ways of a charuco, got \[2, 5\]"),
+        ({"kind": "markers", "shape": [1, 1]}, r"shape must be of at least 2 markers, got \[1, 1\]"),
+        ({"kind": "markers", "shape": [8, 8]}, "dictionary must have the board's 64 markers, got DICT_4X4_50, which"),
     ],
 )
 def test_what_cannot_be_is_told_in_a_line(changes, says):
