@@ -33,7 +33,7 @@ from scenes.placement import of_board, pitch_u, root
 
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
 CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
-NEEDED = f"no point of the board is found: it must be lit, in the picture, and {CLEAR:g} px beside the part there"
+NEEDED = f"no point of the board is found: it must be lit, in the picture, large enough, and {CLEAR:g} px beside the part there"
 _UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
 _EXACT = 1e-16  # px^2: of points without noise and print
 
@@ -128,8 +128,7 @@ def _noise(pictures: Pictures, board: Board) -> np.ndarray:
     share, noise = _contrast(pictures, board)
     with np.errstate(divide="ignore", invalid="ignore"):
         size = noise / share**2
-    unit = back @ _unit(pictures, board, places) @ np.swapaxes(back, -1, -2)
-    found = size[..., None, None] * unit
+        found = size[..., None, None] * (back @ _unit(pictures, board, places) @ np.swapaxes(back, -1, -2))
     there = _inside(places, camera) & _apart(pictures, board)[..., None]
     good = np.isfinite(found).all((-1, -2)) & (share > 0) & there
     return np.where(good[..., None, None], found, np.where(np.eye(2, dtype=bool), np.inf, 0.0))
