@@ -6,12 +6,13 @@ edge noise lets Canny keep, and neither does its error, which therefore is linea
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import sparse
+from scipy.ndimage import binary_dilation
 from scipy.special import ndtr
 
 from imaging.features.locator import MIN_CONTRAST, edge_blur
@@ -22,12 +23,14 @@ from measure.estimators.separate import SeparateEstimator, by_points, calipers_f
 from measure.estimators.thinning import Thinned, Thinning
 from measure.features.calipers import Caliper
 from measure.features.layout import Layout
-from measure.features.lines import cells, trend_along
+from measure.features.lines import cells, fit_lines, trend_along
 from measure.features.optics import Optics
 from measure.features.points import EdgePoints, UnitNoise
+from measure.features.rim_noise import Drawn
 
 _BESIDE = 0.7  # of the gradient at its top is left at a pixel half a diagonal away, at least
 _LOST = 0.1  # of an edge's points; up to there the variance is off by 3 % at most
+_ASIDE, _BY_NOISE = 1.5, 4.0  # px from the line, and standard deviations of the gradient: there noise may make a point
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +79,10 @@ class CannyLocator:
         kernel = profile_kernel(optics.scale_px, caliper.normal)
         return cls(caliper, optics, threshold, thinning, near, along[order], offset[order], gain[order], kernel)
 
-    def locate(self, images: np.ndarray | Thinned) -> EdgePoints:
-        """Edge points in a stack of images, shape (n, height, width), or in its thinned window."""
+    def locate(self, images: np.ndarray | Thinned | Drawn) -> EdgePoints:
+        """Edge points in a stack of images, shape (n, height, width), in its thinned window, or in drawn ones."""
+        if isinstance(images, Drawn):
+            return self._alone.locate(self._alone.thinning.of_drawn(images, self.optics.shape))
         seen = self.thinning(images) if isinstance(images, np.ndarray) else images
         which, pixel = self._kept(seen)
         shift, gradient, curvature, good = top(self._profiles(seen, which, pixel))
@@ -95,6 +100,24 @@ class CannyLocator:
         (_, contrast), (rise, trend), (start, _) = trend_along(along, np.abs(steep), weights)
         sure = self._sure(start, rise) & (weights.sum(1) > (1 - _LOST) * np.diff(self._limits))
         return EdgePoints(along, offset, valid, contrast, first * second < 0, trend, weights, sure)
+
+    def may_jump(self, points: EdgePoints, clean: np.ndarray) -> bool:
+        """Whether noise may give or take points that lie beside the line through those of a noise-free image."""
+        thinning, line = self._alone.thinning, fit_lines(points, points.weights)
+        kept = replace(thinning, threshold=max(thinning.threshold - _BY_NOISE * self._noise, self._noise))(clean[None])
+        row, column = np.nonzero(kept.kept[0])
+        seen = np.stack([column + thinning.columns.start, row + thinning.rows.start], -1)
+        along, offset = self.caliper.coordinates(self.optics.ideal(seen.astype(float)))
+        beside = np.zeros(kept.kept.shape[1:], bool)
+        aside = np.abs(offset - line.mean_offset - np.tan(line.tilt) * (along - line.mean_along)) > _ASIDE
+        beside[row[aside], column[aside]] = True
+        return bool(binary_dilation(beside, np.ones((3, 3)))[tuple(self._alone.near.T)].any())
+
+    @cached_property
+    def _alone(self) -> CannyLocator:
+        """The same in the window of this edge."""
+        (thinning,) = thinnings(self.optics, [self.caliper], self.threshold)
+        return CannyLocator.of(self.optics, self.caliper, self.threshold, thinning)
 
     def edge_pixels(self, image: np.ndarray) -> np.ndarray:
         """Row and column of the pixels that the edge points of one image are refined from, int, shape (k, 2)."""
@@ -150,8 +173,12 @@ class CannyLocator:
         """
         first, last = self.caliper.positions[[0, -1]]
         half = np.linspace(start + trend * np.where(trend > 0, first, last), start + trend * (first + last) / 2, 5)
-        noise = np.sqrt(self.optics.noise_variance) * np.linalg.norm(self.kernel[:, 0])
-        return ndtr((self.threshold - half) / max(noise, 1e-9 * self.threshold)).mean(0) < _LOST
+        return ndtr((self.threshold - half) / max(self._noise, 1e-9 * self.threshold)).mean(0) < _LOST
+
+    @property
+    def _noise(self) -> float:
+        """Standard deviation of the gradient by noise, grey levels a pixel."""
+        return float(np.sqrt(self.optics.noise_variance) * np.linalg.norm(self.kernel[:, 0]))
 
     @property
     def _radius(self) -> int:

@@ -26,6 +26,8 @@ from measure.features.optics import Optics
 from measure.features.points import DECIDED, EachPoint, EdgePoints, UnitNoise
 from measure.features.rim_noise import Drawn
 
+_WHOLE = 0.9  # of what a point would count, above which it is certain
+
 
 @dataclass(frozen=True, eq=False)
 class CrossingLocator:
@@ -113,6 +115,10 @@ class CrossingLocator:
         return crossings.edge_points(
             along, offset.T * self.gain, valid.T, contrast, trapezoid(self.positions), counts, turned
         )
+
+    def may_jump(self, points: EdgePoints, clean: np.ndarray) -> bool:
+        """Whether noise may decide which of two edges points of a noise-free image are on."""
+        return bool((points.valid & (points.weights < _WHOLE * trapezoid(self.positions))).any())
 
     def unit_noise(self) -> UnitNoise:
         """Response to noise on a straight edge of unit contrast: the function's over its slope."""

@@ -23,7 +23,6 @@ from measure.features.lines import (
     level_and_slope,
     line_map,
     line_state,
-    trapezoid,
 )
 from measure.features.points import EdgePoints
 from measure.features.rim_noise import Drawn, drawn, is_linear
@@ -31,8 +30,6 @@ from scenes import status
 
 if TYPE_CHECKING:
     from measure.estimators.canny import CannyLocator
-
-_WHOLE = 0.9  # of what a point would count, above which it is certain
 
 
 def calipers_for(layout: Layout, kernel_sigmas: float, trim: float | None = None) -> tuple[Caliper, ...]:
@@ -84,7 +81,7 @@ class PointEstimator:
     def pixels(self) -> np.ndarray:
         return self.locator.pixels
 
-    def estimate(self, images: np.ndarray | Thinned, noise_variance: np.ndarray | float) -> Estimate:
+    def estimate(self, images: np.ndarray | Thinned | Drawn, noise_variance: np.ndarray | float) -> Estimate:
         """As `Estimator.estimate`; ``noise_variance`` (n,) is the mean along the edge, grey levels^2."""
         points = self.locator.locate(images)
         lines = fit_lines(points, points.weights)
@@ -124,14 +121,9 @@ class PointEstimator:
         found = np.zeros((2, pixels.size))
         row, column = told.coords
         found[row, np.searchsorted(pixels, column)] = told.data
-        if asked and self._may_jump(points) and not self._tells_errors(response, clean):
+        if asked and self.locator.may_jump(points, clean) and not self._tells_errors(response, clean):
             found[:] = np.nan
         return found
-
-    def _may_jump(self, points: EdgePoints) -> bool:
-        if not isinstance(self.locator, CrossingLocator):
-            return False
-        return bool((points.valid & (points.weights < _WHOLE * trapezoid(self.caliper.positions))).any())
 
     def _tells_errors(self, response: sparse.csr_array, clean: np.ndarray) -> bool:
         """Whether a line's errors by noise are those that its derivative tells."""

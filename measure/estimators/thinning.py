@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
 import numpy as np
+
+from measure.features.rim_noise import Drawn
 
 TRUNCATE = 3  # standard deviations at which the gradient's kernel ends: it only has to find the pixels
 _FIXED_POINT = 1024  # Canny takes gradients as 16-bit integers: so many units are the threshold
@@ -69,6 +71,13 @@ class Thinning:
         if (units == units[0]).all():
             return Thinned(parts, self._edge_pixels(parts, units[0]))
         return Thinned(parts, np.stack([self._edge_pixels(*one)[0] for one in zip(parts[:, None], units, strict=True)]))
+
+    def of_drawn(self, images: Drawn, shape: tuple[int, int]) -> Thinned:
+        """The same of drawn images of this height and width."""
+        height, width = self.rows.stop - self.rows.start, self.columns.stop - self.columns.start
+        pixels = np.arange(shape[0] * shape[1]).reshape(shape)[self.rows, self.columns]
+        window = images.at(pixels.ravel()).reshape(len(images), height, width)
+        return replace(self, rows=slice(0, height), columns=slice(0, width))(window)
 
     def _edge_pixels(self, parts: np.ndarray, unit: float) -> np.ndarray:
         """Pixels that Canny keeps: gradient above the threshold and largest along its direction.
