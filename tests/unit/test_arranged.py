@@ -20,9 +20,7 @@ def _pictures(folder):
     roof = parts.scene(folder, "roof", placement=KNOWN)
     hidden = [{"name": n, "kind": "width", "features": [{"edge": a}, {"edge": b}]}
               for n, a, b in (("breadth", "e8", "e5"), ("depth", "e1", "e6"))]  # fmt: skip
-    block = parts.scene(folder, "block", placement=KNOWN).with_(
-        measurands=hidden
-    )
+    block = parts.scene(folder, "block", placement=KNOWN).with_(measurands=hidden)
     return [
         Picture.of(roof, (28.0, 300.0), (22.0, 60.0)),
         Picture.of(block, (28.0, 300.0), (22.0, 60.0)),
