@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imaging.light.appearance import is_plain
+from imaging.models.arranged import is_arranged
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.features.arranged import is_told
 from measure.features.layout import layout_of
@@ -19,8 +19,7 @@ def best_estimator(scene: Scene | Picture) -> str:
     arrangement, or not linearly in the noise: there ``arrangement`` is ``ill_conditioned``. No image is asked.
     """
     picture, scene = (scene, scene.scene) if isinstance(scene, Picture) else (None, scene)
-    alike = scene.noise.colour is None and not scene.noise.is_shared
-    if not (is_plain(scene) and alike):
+    if not is_arranged(scene):
         return "gradient"
     return "arrangement" if picture is None or not picture.lights or _tells(picture) else "gradient"
 

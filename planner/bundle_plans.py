@@ -47,8 +47,10 @@ class BundleSet:
         Largest squared ratio of standard uncertainty to tolerance, or the weighted sum, of what is told (of a single
         quantity its variance); what is ``clutter`` counts as four times its variance. None where
         the pictures leave a quantity open.
+    searched : float or None
+        The same by the search's own variances of lines and circles, with which the next two compare.
     exhaustive : float or None
-        The same of the best of all sets of K of the settings that were looked at; None where they are too many.
+        That of the best of all sets of K of the settings that were looked at; None where they are too many.
     bound : float or None
         What no K pictures of the grid can stay below, if a glance is right; None where no pictures, however many, tell
         every quantity, or K do not, and of several free lights.
@@ -63,6 +65,7 @@ class BundleSet:
     sensors: Sensors
     prediction: BundlePrediction
     minimised: float | None
+    searched: float | None
     exhaustive: float | None
     bound: float | None
     impossible: bool
@@ -104,9 +107,9 @@ class BundleSet:
 
     @property
     def gap(self) -> float | None:
-        """``minimised`` over ``bound``, less 1: at most so much is lost to the best pictures of the grid; None where
+        """``searched`` over ``bound``, less 1: at most so much is lost to the best pictures of the grid; None where
         there is no bound or no plan."""
-        return self.minimised / self.bound - 1 if self.bound and self.minimised else None
+        return self.searched / self.bound - 1 if self.bound and self.searched else None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -181,7 +184,8 @@ def plan_bundle(
     sensor two lights are candidates, of several free lights two of the places that are best from any sensor for all
     quantities or for one (without a bound). Sets are chosen greedily with exchange, each picture that is chosen gets
     the best of all lights beside the others and is ray-traced (clutter, light between surfaces), and sets are chosen
-    again, until all that is chosen has been looked at. What is returned is predicted by `predict_bundle`.
+    again, until all that is chosen has been looked at. The search takes lines as the model has them, edge by edge; what
+    is returned is predicted by `predict_bundle`, by the ``calibrated`` model as the estimator has them that is taken.
 
     Parameters
     ----------
@@ -260,12 +264,14 @@ def _combinations(problem: SearchProblem, grid: Grid, report: Report) -> np.ndar
 def _sets(pool: NetworkPool, count: int, *, bounded: bool) -> tuple[BundleSet, ...]:
     rows, known, firm = pool.known()
     made, quantities, aim = [], pool.problem.scene.quantities, known.aim
+    is_absolute = pool.problem.model == DEFAULT_MODEL
     for size, members in enumerate(best_sets(known, count), 1):
         pictures = tuple(pool.looked[int(rows[member])] for member in members)
-        prediction = predict_bundle(pictures, **vars(pool.freedom), model=pool.problem.model)
+        prediction = predict_bundle(pictures, **vars(pool.freedom), model=None if is_absolute else pool.problem.model)
         counts = np.array([_COUNTS.get(state, 0.0) for state in prediction.status])
         told = counts > 0
-        steady = firm.variances(np.array(members)) <= STEEPEST * known.variances(np.array(members))
+        by_search = known.variances(np.array(members))
+        steady = firm.variances(np.array(members)) <= STEEPEST * by_search
         every, near = best_of_all(pool.most, size), best_of_all(known, size)
         impossible = bounded and every is not None and every[0] > 0
         bound = math.inf if not bounded else every[1] if every else pool.most.relaxed(size)[0]
@@ -275,6 +281,7 @@ def _sets(pool: NetworkPool, count: int, *, bounded: bool) -> tuple[BundleSet, .
                 sensors=pool.freedom.sensors,
                 prediction=prediction,
                 minimised=float(aim(counts * np.where(told, prediction.u, 0.0) ** 2)) if told.all() else None,
+                searched=float(aim(by_search)) if told.all() and np.isfinite(by_search).all() else None,
                 exhaustive=None if near is None or near[0] else near[1],
                 bound=None if impossible or not math.isfinite(bound) else bound,
                 impossible=impossible,

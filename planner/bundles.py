@@ -13,6 +13,7 @@ from imaging.bundles.bundle import Bundle
 from imaging.bundles.preferred import Preferred
 from imaging.bundles.unknowns import Axes, Cameras, Freedom, Sensors, Shape
 from imaging.models import DEFAULT_MODEL, ModelName, variance_model
+from imaging.models.arranged import arranged, is_arranged
 from imaging.models.bias import cluttered
 from imaging.models.errors import Errors
 from imaging.pictures import Pictures
@@ -104,7 +105,7 @@ def predict_bundle(
     shape: Shape = "in_space",
     axes: Axes = "known",
     cameras: Cameras = "one",
-    model: ModelName = DEFAULT_MODEL,
+    model: ModelName | None = None,
     close: bool = True,
     biases: Sequence[FeatureBias | None] | None = None,
 ) -> BundlePrediction:
@@ -115,8 +116,9 @@ def predict_bundle(
     pictures : sequence of Picture
     sensors, shape, axes, cameras
         What is not known before (`imaging.bundles.unknowns.Freedom`).
-    model : {"calibrated", "paper"}
-        Of the lines' and circles' variances.
+    model : {"calibrated", "paper"}, optional
+        Of the lines' and circles' variances, which are those of ``gradient`` by the first; by default as the estimator
+        has them that `measure.bundle` takes (`imaging.models.arranged`).
     close : bool
         Whether biases are looked for (ray tracing), which leaves out what is ``clutter`` wherever that can be done.
     biases : sequence of FeatureBias or None, optional
@@ -137,15 +139,11 @@ def predict_bundle(
     >>> told.status[0], bool(told.sigma[0] > 0)
     ('ok', True)
     """
-    if model not in ("calibrated", "paper"):
+    if model not in (None, "calibrated", "paper"):
         raise InvalidInput(f"model must be one of calibrated, paper for several pictures, got {model!r}")
     bundle = Bundle.of(pictures, Freedom(sensors, shape, axes, cameras))
-    each = [variance_model(model)(Pictures.of(picture)) for picture in bundle.pictures]
-    noise = [errors.of_features for errors in each]
+    noise, states = zip(*(_told(picture, model, close=close) for picture in bundle.pictures), strict=True)
     if biases is None:
-        states = [
-            states_of(errors, picture, close=close) for errors, picture in zip(each, bundle.pictures, strict=True)
-        ]
         chosen = Preferred.of(bundle, noise, states)
         said, doubts = chosen.statuses(states), None
     else:
@@ -164,6 +162,15 @@ def predict_bundle(
         preferred=chosen,
         doubts=doubts,
     )
+
+
+def _told(picture: Picture, model: ModelName | None, *, close: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance (q, q) of one picture's lines and circles, and their statuses (E + C,); ``close``: with biases, which
+    ``arrangement`` is without."""
+    pictures = Pictures.of(picture)
+    errors, together = variance_model(model or DEFAULT_MODEL)(pictures), model is None and is_arranged(picture.scene)
+    noise = arranged(pictures) if together else errors.of_features
+    return noise, states_of(errors, picture, close=close and not together)
 
 
 def _corrected(

@@ -295,10 +295,6 @@ def _check(pictures: tuple[Picture, ...]) -> None:
     if not pictures:
         raise InvalidInput("pictures must be at least one, got none")
     first = pictures[0].scene
-    for each in pictures:
-        if each.scene.uncertainty.lens_modes:
-            told = len(each.scene.uncertainty.lens_modes)
-            raise InvalidInput(f"uncertainty.lens_modes must be left out for pictures adjusted together, got {told}")
     for each in pictures[1:]:
         if each.scene.quantities != first.quantities or each.scene.object != first.object:
             raise InvalidInput("pictures must be of one part with the same measurands, got others")

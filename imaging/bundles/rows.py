@@ -20,7 +20,7 @@ def design(unknowns: Unknowns, seen: Seen, board: SeenBoard | None, number: int)
     with np.errstate(divide="ignore", invalid="ignore"):
         whole = by_place(seen, np.array(unknowns.scene.camera.look_at)) @ unknowns.basis("part")
         whole = whole - by_place(seen) @ unknowns.sensor(number)
-        whole = whole + by_camera(seen) @ unknowns.camera(number)
+        whole = whole + by_camera(seen, unknowns.modes[number - 1]) @ unknowns.camera(number)
         for e, name in enumerate(seen.names):
             ends = list(solid.edge(name).ends)
             slopes = np.einsum("i,nij->nj", seen.normals[e], seen.slopes(solid.vertices[ends]))
@@ -40,7 +40,7 @@ def design(unknowns: Unknowns, seen: Seen, board: SeenBoard | None, number: int)
 def _board_design(unknowns: Unknowns, seen: Seen, board: Board, number: int) -> np.ndarray:
     """Derivatives (n, 2, N) of the images of a board's points by the N unknowns."""
     by_sensor = steps(board.points, np.array(seen.camera.look_at)) @ unknowns.sensor(number)
-    by_camera = shifts(from_axis(board.points, seen.sensors, seen.camera), seen.camera)
+    by_camera = shifts(from_axis(board.points, seen.sensors, seen.camera), seen.camera, unknowns.modes[number - 1])
     moved = seen.slopes(board.points) @ (point_moves(unknowns, board) - by_sensor)
     return moved + by_camera @ unknowns.camera(number)
 
@@ -50,7 +50,7 @@ def _board_off(unknowns: Unknowns, seen: Seen, board: Board, number: int, number
     camera = unknowns.camera(number) @ numbers
     here = from_axis(board.points, seen.sensors, seen.camera)
     there = _projected(unknowns, seen, number, numbers, points_at(unknowns, board, numbers))
-    return there - here + (shifts(here, seen.camera) @ camera if camera.any() else 0.0)
+    return there - here + (shifts(here, seen.camera, unknowns.modes[number - 1]) @ camera if camera.any() else 0.0)
 
 
 def _parameters(board: SeenBoard, points: np.ndarray) -> np.ndarray:
@@ -71,7 +71,7 @@ def off(unknowns: Unknowns, seen: Seen, board: SeenBoard | None, number: int, nu
         normal = rim_normals(seen, circle)
         found[seen.numbers(c)] = rim_fit(seen, circle)[1] @ np.einsum("ni,ni->n", normal, there - here)
     camera = unknowns.camera(number) @ numbers
-    found = found + by_camera(seen) @ camera if camera.any() else found
+    found = found + by_camera(seen, unknowns.modes[number - 1]) @ camera if camera.any() else found
     if board is not None:
         found[seen.of_board] = _parameters(board, _board_off(unknowns, seen, board.board, number, numbers))
     return found

@@ -12,7 +12,7 @@ flatness leave open of each point. All are errors beside what the scene says, fe
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -25,6 +25,7 @@ from imaging.geometry.projection import camera_frame, sensor_position
 from imaging.pictures import Pictures
 from scenes import Circle, InvalidInput, Scene, Side
 from scenes.cameras import estimated
+from scenes.cameras.lens_modes import LensMode
 from scenes.carriers import Place, moved
 from scenes.measurands.features import along_of, face_beside, plane_of
 from scenes.placement import of_board, pitch_u, prior
@@ -53,8 +54,8 @@ class Freedom:
     axes : {"known", "unknown"}
         Whether circles' axes point on the part as the model says.
     cameras : {"one", "each"}
-        Whether all pictures are of one camera, or each of its own, as to what ``uncertainty.covariance`` and
-        ``principal_point_px`` leave open of it.
+        Whether all pictures are of one camera, or each of its own, as to what ``uncertainty.covariance``,
+        ``lens_modes`` and ``principal_point_px`` leave open of it.
 
     Raises
     ------
@@ -131,13 +132,16 @@ class Unknowns:
         The part, the V sensors, what carries them, the cameras, the vertices, the circles, a board.
     carried : dict of str to tuple of ndarray, shape (6, k)
         By block of a carrier's errors (`scenes.carriers`): how each picture's sensor moves by its k numbers.
+    modes : tuple of tuple of LensMode
+        Errors of each picture's lens where that is splined.
     """
 
     scene: Scene
     vertices: tuple[int, ...]
     circles: tuple[str, ...]
     blocks: tuple[Block, ...]
-    carried: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
+    carried: Mapping[str, tuple[np.ndarray, ...]]
+    modes: tuple[tuple[LensMode, ...], ...]
 
     @classmethod
     def of(cls, scene: Scene, pictures: tuple[Pictures, ...], seen: Seen, freedom: Freedom) -> Unknowns:
@@ -151,7 +155,7 @@ class Unknowns:
         blocks += [_of_one(name, moves[0].shape[1]) for name, moves in carried.items()]
         blocks += [*_cameras(pictures, freedom), *_estimated(pictures, freedom)]
         blocks += [*_of_features(scene, vertices, seen, freedom), *_of_board(scene)]
-        return cls(scene, vertices, seen.circles, tuple(blocks), carried)
+        return cls(scene, vertices, seen.circles, tuple(blocks), carried, _modes(pictures, freedom))
 
     @cached_property
     def slices(self) -> dict[str, slice]:
@@ -192,9 +196,11 @@ class Unknowns:
         return np.concatenate([np.where(each.turns, 1 / self.scene.solid.extent, 1.0) for each in self.blocks])
 
     def camera(self, number: int) -> np.ndarray:
-        """Derivatives (9, n) of errors of the calibration's parameters of the camera of the picture of a number."""
+        """Derivatives (9 + m, n) of errors of the calibration's parameters, and of a splined lens, of the camera of the
+        picture of a number."""
         name = "camera" if "camera" in self.slices else f"camera {number}"
-        return self.basis(name) + by_estimated(self.scene) @ self.basis(self.estimated(number))
+        by_own = np.pad(by_estimated(self.scene), ((0, len(self.modes[number - 1])), (0, 0)))
+        return self.basis(name) + by_own @ self.basis(self.estimated(number))
 
     def estimated(self, number: int) -> str:
         """Name of the block of what is estimated of that camera."""
@@ -286,6 +292,13 @@ def _cameras(pictures: tuple[Pictures, ...], freedom: Freedom) -> Iterator[Block
         yield Block(name, half, np.ones(half.shape[1]), np.zeros(half.shape[1], bool))
         if freedom.cameras == "one":
             return
+
+
+def _modes(pictures: tuple[Pictures, ...], freedom: Freedom) -> tuple[tuple[LensMode, ...], ...]:
+    found = tuple(each.scene.uncertainty.lens_modes for each in pictures)
+    if freedom.cameras == "one" and any(modes != found[0] for modes in found):
+        raise InvalidInput("pictures of one camera must be of the same uncertainty.lens_modes, got others")
+    return found
 
 
 def _estimated(pictures: tuple[Pictures, ...], freedom: Freedom) -> Iterator[Block]:

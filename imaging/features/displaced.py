@@ -5,6 +5,9 @@ Numbered as in `imaging.features.seen`; 0 of forms and of a board.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
 import numpy as np
 
 from imaging.features.seen import Seen
@@ -13,6 +16,10 @@ from imaging.geometry.projection import from_axis, jacobian_ideal
 from scenes import Camera, Circle, Scene
 from scenes.cameras.covariance import ORDER
 from scenes.cameras.lens import by_coefficients
+from scenes.cameras.lens_modes import LensMode
+
+if TYPE_CHECKING:
+    from scenes.cameras.splined import Splined
 
 _AROUND = 64  # points of a circle
 _ALONG = np.linspace(0.0, 1.0, 11)  # of a line's image
@@ -86,8 +93,9 @@ def _outwards(seen: Seen, circle: Circle) -> tuple[np.ndarray, np.ndarray, np.nd
     return np.stack([along[..., 1], -along[..., 0]], -1) / speed, slopes, speed, radial
 
 
-def shifts(images: np.ndarray, camera: Camera) -> np.ndarray:
-    """Derivatives (..., 2, 9) of where image points (..., 2), ideal px from the middle, are found, by errors `ORDER`.
+def shifts(images: np.ndarray, camera: Camera, modes: Sequence[LensMode] = ()) -> np.ndarray:
+    """Derivatives (..., 2, 9 + m) of where image points (..., 2), ideal px from the middle, are found, by errors
+    `ORDER` and by m errors of a splined lens.
 
     The camera records them by its true parameters, and they are taken back by those of the scene; distortion is
     OpenCV's.
@@ -97,24 +105,27 @@ def shifts(images: np.ndarray, camera: Camera) -> np.ndarray:
     zero, one = np.zeros(there.shape[:-1]), np.ones(there.shape[:-1])
     columns = (there[..., 0] / focal, zero), (zero, there[..., 1] / focal), (one, zero), (zero, one)
     pinhole = np.stack([np.stack(column, -1) for column in columns], -1)
-    moved = np.concatenate([pinhole, focal * by_coefficients(images / focal)], -1)
+    lens = cast("Splined", camera.lens)  # where there are modes
+    bent = [focal * mode.shifts(lens, images / focal) + mode.focal_px / focal * there for mode in modes]
+    moved = np.concatenate([pinhole, focal * by_coefficients(images / focal), *(each[..., None] for each in bent)], -1)
     return np.linalg.solve(lens_jacobian(ideal, camera), moved)
 
 
-def by_camera(seen: Seen) -> np.ndarray:
-    """Derivatives (..., q, 9) of lines and circles by errors of `ORDER`, as they are fitted."""
-    whole = np.zeros((*seen.sensors.shape[:-1], seen.count, len(ORDER)))
+def by_camera(seen: Seen, modes: Sequence[LensMode] = ()) -> np.ndarray:
+    """Derivatives (..., q, 9 + m) of lines and circles by errors of `ORDER`, and m of a splined lens, as they are
+    fitted."""
+    whole = np.zeros((*seen.sensors.shape[:-1], seen.count, len(ORDER) + len(modes)))
     fit = np.linalg.pinv(np.stack([np.ones_like(_ALONG), _ALONG], -1))
     for e in range(len(seen.names)):
         start, along, normal = (each[..., e, None, :] for each in (seen.start, seen.along, seen.normals))
-        off = np.einsum("...nik,...ni->...nk", shifts(start + _ALONG[:, None] * along, seen.camera), normal)
+        off = np.einsum("...nik,...ni->...nk", shifts(start + _ALONG[:, None] * along, seen.camera, modes), normal)
         lines = fit @ off
         lines[..., 1, :] /= np.linalg.norm(along, axis=-1)
         whole[..., 2 * e : 2 * e + 2, :] = lines
     for c, name in enumerate(seen.circles):
         circle = seen.solid.circle(name)
         images = from_axis(circle.at(around(circle)), seen.sensors, seen.camera)
-        off = np.einsum("...ni,...nik->...nk", rim_normals(seen, circle), shifts(images, seen.camera))
+        off = np.einsum("...ni,...nik->...nk", rim_normals(seen, circle), shifts(images, seen.camera, modes))
         whole[..., seen.numbers(c), :] = rim_fit(seen, circle)[1] @ off
     return whole
 

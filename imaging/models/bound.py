@@ -231,13 +231,9 @@ def _one(
     object, in one picture."""
     pick = [np.broadcast_to(poses, (*lead, 2))[index] for poses in (pictures.sensors, *pictures.lights)]
     one = Pictures(pictures.scene, pick[0], tuple(pick[1:]))
-    known, told = measurands(one), information(one)
-    edges, required = len(known.view.names), told.model.arrangement.required
-    seen = known.view.visible & (required >= 0).all(-1)
-    rows = line_rows(known, required, len(told.model.arrangement.vertices))
-    covariance = told.vertices()
-    lines = np.einsum("eki,ij,elj->ekl", rows, covariance, rows)
-    joint = rows.reshape(2 * edges, -1) @ covariance @ rows.reshape(2 * edges, -1).T
+    known = measurands(one)
+    joint, seen = joint_lines(known, information(one))
+    lines = np.einsum("ekel->ekl", joint.reshape(len(seen), 2, len(seen), 2))
     hidden = np.logical_or(*(part[:, ~seen].any(-1) for part in known.of_lines(known.gradient)))
     plane = known.gradient_object
     if known.placing is not None:
@@ -247,6 +243,14 @@ def _one(
     variances = (np.einsum("mi,ij,mj->m", each, joint, each) for each in (known.gradient, plane))
     image, plane = (np.where(hidden, np.inf, each) for each in variances)
     return np.where(seen[:, None, None], lines, np.inf), image, plane
+
+
+def joint_lines(known: Measurands, told: Information) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance (2 E, 2 E) of all lines' displacements at their first ends and rotations in one picture, px and rad,
+    and which of them are seen, bool (E,)."""
+    required = told.model.arrangement.required
+    rows = line_rows(known, required, len(told.model.arrangement.vertices)).reshape(2 * len(required), -1)
+    return rows @ told.vertices() @ rows.T, known.view.visible & (required >= 0).all(-1)
 
 
 def _with_board(joint: np.ndarray, known: Measurands) -> np.ndarray:

@@ -18,10 +18,10 @@ import numpy as np
 from imaging.blurred.arrangement import Arrangement
 from imaging.blurred.model import BlurredModel, State
 from imaging.models.bound import Known, known, response
+from imaging.models.reach import model_within, reach_of
 from imaging.sensor import Levels, squared_errors
 from measure.estimators.expansion import Expansion, Pieces
 from measure.estimators.kinds import ESTIMATORS, EstimatorKind
-from measure.estimators.reach import model_within, reach_of
 from measure.features.layout import Layout
 from scenes import InvalidInput, Noise
 

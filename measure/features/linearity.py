@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from imaging.models.reach import asked_of
 from measure.estimators.arrangement import ArrangementEstimator, Centre
-from measure.estimators.reach import asked_of
 
 _CHEAP, _FULL = 256, (24, 96)  # drawn images; of those measured in full more where the first leave it open
 _BEYOND = 0.05  # part of them that may leave the expansion's range

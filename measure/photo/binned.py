@@ -11,7 +11,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from measure.estimators.reach import is_long
+from imaging.models.reach import is_long
 from measure.photo.profiles import edge_sigma
 from scenes.photograph import Photograph
 

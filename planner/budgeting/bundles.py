@@ -15,7 +15,7 @@ from imaging.models.bias import MOST
 from imaging.pictures import Pictures
 from planner.budgeting.features import Features
 from planner.budgeting.sensitivities import STEP, pulled
-from planner.budgeting.sources import Source, sources
+from planner.budgeting.sources import LENS_MODE, Source, sources
 from planner.budgeting.station import Station
 from planner.budgeting.terms import DATUMS, MODEL, NOISE, PATTERN, Term, of_doubts, stated, still_noise
 from planner.bundles import BundlePrediction, predict_bundle
@@ -128,6 +128,7 @@ def _sources(told: BundlePrediction, sensors: tuple[str, ...]) -> tuple[tuple[So
         for each in sources(picture.scene):
             of_sensor = each.name.startswith(_OF_SENSORS)
             of_camera = each.name in (*ORDER, *inputs(picture.scene.placement.camera))
+            of_camera = of_camera or each.name.startswith(LENS_MODE)
             adjusted = each.name.startswith(_ADJUSTED) or of_camera or (of_sensor and sensors[k] != "known")
             carried = each.name.startswith(_OF_CARRIERS) and "uncertain" in sensors
             if each.kind != "geometry" or adjusted or carried:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from scenes.cameras.splined import Rows, Splined
+from scenes.cameras.splined import Rows, Splined, on_plane
 from scenes.errors import InvalidInput, describe
 from scenes.files.door import read_json
 from scenes.model import Model
@@ -31,6 +31,11 @@ class LensMode(Model):
     def moved(self, lens: Splined, step: float) -> Splined:
         """A lens with so much of this error."""
         return lens.tried(right=_sum(lens.right, self.right, step), down=_sum(lens.down, self.down, step))
+
+    def shifts(self, lens: Splined, points: np.ndarray) -> np.ndarray:
+        """By how much such a lens records points (..., 2) of a pinhole's image elsewhere with this error, but for that
+        of its focal length; both in focal lengths."""
+        return lens.tried(right=self.right, down=self.down).bent(points) - on_plane(points, lens.plane)
 
 
 def _sum(rows: Rows, more: Rows, step: float) -> Rows:

@@ -15,7 +15,9 @@ on.
 
 from __future__ import annotations
 
+import itertools
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -216,18 +218,19 @@ def report(rows: list[Row]) -> bool:
     return all(inside(rows)) and all(centred(rows)) and is_one(rows)
 
 
-def of_part(scene: Scene, draws: int, sets: int, seed: int) -> tuple[list[Row], list[Row], list[str]]:
-    """Rows of one part in exact images, of sensors taken for known, and names of controls that pass."""
+def of_part(scene: Scene, draws: int, sets: int, seeds: Iterator[int]) -> tuple[list[Row], list[Row], list[str]]:
+    """Rows of one part in exact images, of sensors taken for known, and names of controls that pass; each of noise of
+    its own, or rows would be off together."""
     tri, rows, wrong = [Picture.of(scene, sensor, LIGHT) for sensor in SENSORS], [], []
     clean = [image(each) for each in tri]
     for count in (2, 3):
-        rows += of_noise(f"{scene.name}, {count} known", clean[:count], tri[:count], "known", draws, seed)
-        drawn, as_known = of_sensors(f"{scene.name}, {count} uncertain", tri[:count], sets, seed + 10 * count)
+        rows += of_noise(f"{scene.name}, {count} known", clean[:count], tri[:count], "known", draws, next(seeds))
+        drawn, as_known = of_sensors(f"{scene.name}, {count} uncertain", tri[:count], sets, next(seeds))
         rows, wrong = rows + drawn, wrong + as_known
     moved = image(_elsewhere(tri[2], 0.5, 0.2, 0.2, 0.1))
     label = f"{scene.name}, third unknown"
-    rows += of_noise(label, [*clean[:2], moved], tri, ("known", "known", "unknown"), draws, seed)
-    return rows, wrong, controls(tri, draws, seed)
+    rows += of_noise(label, [*clean[:2], moved], tri, ("known", "known", "unknown"), draws, next(seeds))
+    return rows, wrong, controls(tri, draws, next(seeds))
 
 
 def of_station(draws: int, seed: int, smaller: int = 1) -> list[Row]:
@@ -301,10 +304,11 @@ def bundles(
     """Two and three pictures adjusted together: values scatter as told; exact 40 minutes, station 30, board 90."""
     rows, wrong, passed = [], [], []
     if only in ("", "exact"):
+        seeds = itertools.count(1000 * seed)
         with tempfile.TemporaryDirectory() as folder:
             for name in ("roof", "wedge"):
                 scene = parts.scene(Path(folder), name, placement=_KNOWN, uncertainty=UNSURE)
-                found = of_part(scene, draws, sets, seed)
+                found = of_part(scene, draws, sets, seeds)
                 rows, wrong, passed = rows + found[0], wrong + found[1], passed + found[2]
     if only in ("", "board"):
         found, unseen = of_board(3 * sets, seed)  # of four rows fewer do not show a variance 1.3 times too large

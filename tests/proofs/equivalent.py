@@ -32,7 +32,7 @@ EQUIVALENT: dict[str, str] = {
         "of two axes the second is the last",
     'measure/photo/quadrilateral.py: return _told(first, state, np.nan, "gradient", 2.0, there.layout)':
         "the threshold of edge points, which this estimator does not have",
-    "measure/estimators/reach.py: return np.full( 2, np.inf)": "nothing is told within either reach: all infinite",
+    "imaging/models/reach.py: return np.full( 2, np.inf)": "nothing is told within either reach: all infinite",
     'validation/hard/fit_cases.py: ("ellipse 1e6 px from the origin", (1e6, 999999.0, 40.0, 20.0, 0.7), many, 1e-8),':
         "a case as far away",
     "measure/goodness.py: each = np.where(used, freedom, 2.0)": "parts without freedom are left out two lines below",

@@ -8,8 +8,8 @@ import pytest
 import measure
 import planner
 from imaging.models.bound import Information, fisher, information, known
+from imaging.models.reach import NEAR, asked_of, model_within
 from imaging.pictures import Pictures
-from measure.estimators.reach import NEAR, asked_of, model_within
 from measure.features.layout import layout_of, polygon_layout
 from measure.features.optics import Optics
 from measure.features.shape import find_shape, prepared

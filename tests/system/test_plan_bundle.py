@@ -22,7 +22,8 @@ def test_json_is_the_plan():
     predicted = planner.predict_bundle(pictures, "known")
     assert two["measurands"][0]["u"] == pytest.approx(predicted.u[0])
     assert two["measurands"][0]["U"] == pytest.approx(planner.bundle_budget(pictures, "known")["distance"].U)
-    assert two["gap"] == pytest.approx(two["minimised"] / two["bound"] - 1)
+    assert two["minimised"] == pytest.approx(predicted.u[0] ** 2)
+    assert two["gap"] == pytest.approx(two["searched"] / two["bound"] - 1)
 
 
 def test_table_says_what_one_picture_leaves_open():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import measure
-from measure.estimators import reach
+from imaging.models import reach
 from measure.photo import binned
 from measure.photo.binned import back, bin_size, into
 from scenes.photograph import Photograph

@@ -12,7 +12,12 @@ from imaging.bundles.bundle import Bundle
 from imaging.bundles.unknowns import Freedom
 from imaging.geometry.lens import image_centre, undistorted
 from imaging.geometry.projection import project, rays, sensor_position
+from imaging.models import variance_model
+from imaging.pictures import Pictures
 from measure.boards.projections import rays_of
+from planner.budgeting.features import Features
+from planner.budgeting.sources import sources
+from planner.budgeting.station import Station
 from scenes import InvalidInput, Picture
 from tests.boards import SMALL, poses
 from tests.unit.test_splined import SHAPE, Wavy, boards
@@ -107,6 +112,34 @@ def test_a_budget_has_what_other_lenses_do(scene):
     assert told.contribution > 1.1 * np.linalg.norm(slopes[::2])
 
 
+def _noise(picture):
+    return variance_model("calibrated")(Pictures.of(picture)).of_features
+
+
+def test_several_pictures_have_them_as_unknowns_of_their_camera(scene):
+    """What each error does to pictures' lines, by the budget's recorded points, moves a value as far as the adjustment
+    says that it may be off by it; one camera is another thing than two."""
+    pictures = [Picture.of(scene, (30.0, azimuth), LIGHT) for azimuth in (135.0, 225.0)]
+    noise, moved = [_noise(each) for each in pictures], 0.0
+    adjusted = Bundle.of(pictures, Freedom("known")).adjusted(noise)
+    for picture, pull in zip(pictures, adjusted.by_features, strict=True):
+        features, rows = Features(Pictures.of(picture)), []
+        here = Station.nominal(features.pictures)
+        for each in (one for one in sources(scene) if one.name.startswith("lens mode")):
+            ahead, behind = features.errors([each.moved(here, 0.01), each.moved(here, -0.01)])
+            rows.append((ahead - behind) / 0.02)
+        moved = moved + pull @ np.transpose(rows)
+    told = adjusted.by_priors["camera"]
+    assert told.shape == moved.shape == (1, 9)
+    assert np.abs(told + moved).max() < 0.005 * np.abs(told).max()  # 0.0011 is found; the signs are opposite
+    apart = Bundle.of(pictures, Freedom("known", cameras="each")).adjusted(noise).known_before
+    assert adjusted.known_before["camera"] > 1.05 * np.hypot(apart["camera 1"], apart["camera 2"])
+    budget, told = planner.bundle_budget(pictures, "known")["distance"], planner.predict_bundle(pictures, "known")
+    (row,) = (row for row in budget.contributions if row.source == "camera")
+    assert row.contribution == pytest.approx(told.known_before["camera"][0])
+    assert not any(row.source.startswith("lens mode") for row in budget.contributions)
+
+
 def test_what_modes_cannot_be_is_told_in_a_line(scene, tmp_path):
     told = [mode.model_dump() for mode in scene.uncertainty.lens_modes]
     with pytest.raises(InvalidInput, match=r"lens_modes must be left out unless camera\.lens is splined, got brown_co"):
@@ -115,8 +148,11 @@ def test_what_modes_cannot_be_is_told_in_a_line(scene, tmp_path):
         scene.with_(uncertainty={"lens_modes": [told[0], told[1] | {"down": told[1]["down"][:4]}]})
     with pytest.raises(InvalidInput, match=r"uncertainty\.covariance must be left out with lens_modes, got both"):
         scene.with_(uncertainty={"covariance": {"names": ["fx"], "matrix": [[1.0]]}})
-    with pytest.raises(InvalidInput, match="lens_modes must be left out for pictures adjusted together, got 9"):
-        Bundle.of([Picture.of(scene, SENSOR, LIGHT)], Freedom())
+    fewer = scene.with_(uncertainty={"lens_modes": told[:8]})
+    two = [Picture.of(each, (30.0, azimuth), LIGHT) for each, azimuth in ((scene, 135.0), (fewer, 225.0))]
+    with pytest.raises(InvalidInput, match=r"of one camera must be of the same uncertainty\.lens_modes, got others"):
+        Bundle.of(two, Freedom("known"))
+    assert Bundle.of(two, Freedom("known", cameras="each")).adjusted([_noise(each) for each in two]).is_told.all()
     given = boards(Wavy(0.0), poses(SMALL, 8, np.random.default_rng(5), 420.0), np.random.default_rng(7))
     plain = measure.calibrate_camera(given, SMALL.square, SHAPE)
     with pytest.raises(InvalidInput, match="model must be splined for modes of its lens"):

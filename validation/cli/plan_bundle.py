@@ -83,7 +83,7 @@ def _set(each: planner.BundleSet) -> dict[str, Any]:
         **picked(each, "is_plan", "minimised", "worst_ratio", "limiting"),
         "lost": list(each.lost),
         "hard": list(each.hard),
-        **picked(each, "exhaustive", "bound", "gap", "impossible"),
+        **picked(each, "searched", "exhaustive", "bound", "gap", "impossible"),
         "measurands": [
             {name: row[name] for name in ("name", "kind", "unit", "sigma", "u_placed", "u")}
             | {"U": U, "ratio": ratio, "status": row["status"], "reason": reason}

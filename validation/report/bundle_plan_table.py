@@ -18,7 +18,8 @@ _SENSORS = {
 }
 _TERMS = """\
   minimised: what is said above, of all pictures adjusted together. over bound: how far above what no pictures of the
-  grid can stay below, by a glance. over exhaustive: above the best of all sets of what was looked at closely."""
+  grid can stay below, by a glance. over exhaustive: above the best of all sets of what was looked at closely. Both are
+  told edge by edge, as the search has it; all else as the estimator that is taken has it."""
 
 
 def report(found: planner.BundlePlan, seconds: float) -> Group:
@@ -48,7 +49,7 @@ def _numbers(found: planner.BundlePlan) -> Table:
     columns = "pictures", "told", "minimised", "worst ratio", "limited by", "over bound", "over exhaustive"
     table, whole = _table("", *columns), len(found.scene.quantities)
     for each in found.sets:
-        near = each.minimised / each.exhaustive - 1 if each.exhaustive and each.minimised else None
+        near = each.searched / each.exhaustive - 1 if each.exhaustive and each.searched else None
         told = f"{whole - len(each.lost)} of {whole}"
         if each.is_plan:
             table.add_row(

@@ -28,7 +28,7 @@ def reach_of(arrangement: Arrangement, shape: tuple[int, int], noise: Noise) -> 
     `NEAR`; less where edges are long; `FARTHEST`, the bound's own, where other edges between the two tell of the
     required ones: the planner's light and pose say what the picture tells.
     """
-    ends = arrangement.vertices[arrangement.required]
+    ends = arrangement.vertices[arrangement.required[arrangement.required[:, 0] >= 0]]
     length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
     most = float(np.clip(_MANY / (2 * max(length, 1.0)), max(_NEAREST, _BLURS * arrangement.blur_px), FARTHEST))
     if most <= NEAR or not _others(arrangement) or not all(region.known for region in arrangement.regions[1:]):
