@@ -34,7 +34,8 @@ from scenes.placement import of_board, pitch_u, root
 _MARGIN = 14.0  # px from the image's ends: beyond what a corner's window reaches
 CLEAR = 40.0  # px between part and board: farther than an estimator looks beside an edge, and blurs
 NEEDED = (
-    f"no point of the board is found: it must be lit, in the picture, large enough, and {CLEAR:g} px beside the part there"
+    "no point of the board is found: it must be lit, in the picture, large enough, and "
+    f"{CLEAR:g} px beside the part there"
 )
 _UNTOLD = 1e-9  # of what was known before: a direction of which points tell less is none
 _EXACT = 1e-16  # px^2: of points without noise and print
