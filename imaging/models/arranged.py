@@ -9,6 +9,7 @@ from imaging.features.measurand import measurands
 from imaging.light.appearance import is_plain
 from imaging.models.bound import information, joint_lines
 from imaging.models.calibrated import calibrated
+from imaging.models.extremes import with_extremes
 from imaging.models.reach import reach_of
 from imaging.pictures import Pictures
 from scenes import Scene
@@ -35,3 +36,17 @@ def arranged(pictures: Pictures) -> np.ndarray:
     lost = ~(np.repeat(seen, 2) & np.isfinite(np.diag(whole)[lines]))
     whole[lines, lines] = np.where(lost[:, None] | lost, np.diag(np.where(lost, np.inf, 0.0)), joint)
     return whole
+
+
+def arranged_variances(pictures: Pictures) -> np.ndarray:
+    """Variances (M,) of all quantities of one picture in the object as ``arrangement`` finds them, the scene's unit
+    squared or degrees^2; infinite where one cannot be measured."""
+    errors, whole = calibrated(pictures), arranged(pictures)
+    known = errors.measurands
+    placing, gradient, forms = known.placing, known.gradient_object, known.seen.of_forms
+    whole[forms, forms] = np.diag(np.array(errors.forms, float))
+    gradient = gradient if placing is None else placing.adjusted(whole).gradient(gradient)
+    lost = np.isinf(np.diag(whole))
+    joint = gradient @ np.where(lost[:, None] | lost, 0.0, whole) @ gradient.T
+    told = np.diag(with_extremes(known.quantities, known.value_object, gradient, joint)[1])
+    return np.where(((gradient != 0) & lost).any(1), np.inf, told)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from imaging.light.appearance import is_plain
+from imaging.models.arranged import arranged_variances, is_arranged
 from imaging.pictures import Pictures
 from planner.budgeting.features import Features
 from planner.budgeting.products import products
@@ -132,7 +132,7 @@ def budget(
         Polar angle and azimuth, degrees; not with a picture, which has its own.
     variances : ndarray, shape (M,), optional
         Of the values by pixel noise, the scene's unit squared or degrees^2, where a picture tells them better than the
-        models do: ``calibrated`` of the classic locators, ``bound``, at which ``arrangement`` stands.
+        models do: ``calibrated`` of the classic locators, of ``arrangement`` as it knows all lines together.
     biases : ndarray, shape (M,), optional
         Of the values without noise, measured in a noise-free picture, in place of the predicted ones.
     statuses : tuple of str, optional
@@ -172,11 +172,11 @@ def budget(
         if not np.isfinite(each.variance_object):
             raise InvalidInput(f"{each.name} must be measurable for a budget, got {each.status} in this picture")
     features = Features(Pictures.of(picture))
-    biased = not is_plain(picture.scene) if biased is None else biased
+    biased = not is_arranged(picture.scene) if biased is None else biased
     given = sources(picture.scene)
     slopes = sensitivities(features, given, biased=biased)
     told = prediction if biased else predict(picture, model="bound")  # by the estimator that is meant
-    noise = np.array([each.variance_object for each in told.measurands]) if variances is None else variances
+    noise = variances if variances is not None else _noise(features.pictures, told, biased=biased)
     beside = terms(features.pictures, prediction.measurands, noise, biases, biased=biased, doubts=doubts,
                    together=products(features, given))  # fmt: skip
     inputs, budgets = shared_inputs(picture.scene, given), []
@@ -188,6 +188,11 @@ def budget(
     statuses = statuses or tuple(each.status for each in told.measurands)
     unsure = None if doubts is None else tuple(np.isinf(list(doubts.values())).any(0).tolist())
     return SceneBudget(picture, prediction, given, slopes, beside, tuple(budgets), statuses, unsure)
+
+
+def _noise(pictures: Pictures, told: Prediction, *, biased: bool) -> np.ndarray:
+    """Variances (M,) of the values by pixel noise, the scene's unit squared or degrees^2."""
+    return np.array([each.variance_object for each in told.measurands]) if biased else arranged_variances(pictures)
 
 
 def _checked(name: str, values: Any, picture: Picture) -> np.ndarray | None:
