@@ -9,6 +9,7 @@ targets) are left out. Exit status 2 with one line on standard error where the f
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import math
@@ -149,14 +150,13 @@ def _healed(shape: Any) -> Any:
 
 def _is_closed(faces: list[dict[str, Any]]) -> bool:
     """Whether triangles pass each edge as often one way as the other."""
-    passed: Counter[tuple[Any, Any]] = Counter()
+    numbers: dict[tuple[float, ...], int] = {}
+    passed: Counter[tuple[int, int]] = Counter()
     for face in faces:
-        nodes = [tuple(round(x, _DIGITS) for x in node) for node in face["nodes"]]
-        for triangle in face["triangles"]:
-            a, b, c = (nodes[k] for k in triangle)
-            for one, other in ((a, b), (b, c), (c, a)):
-                passed[min(one, other), max(one, other)] += (one < other) - (other < one)
-    return not any(passed.values())
+        places = (tuple(round(x, _DIGITS) for x in node) for node in face["nodes"])
+        nodes = [numbers.setdefault(place, len(numbers)) for place in places]
+        passed.update((nodes[i], nodes[k]) for a, b, c in face["triangles"] for i, k in ((a, b), (b, c), (c, a)))
+    return all(passed[end, start] == count for (start, end), count in passed.items())
 
 
 def _read(data: bytes) -> tuple[Any, Any]:
@@ -257,8 +257,9 @@ def _triangles(face: Any) -> dict[str, Any]:
     mesh = _mesh(face, location)
     turn = location.Transformation()
     nodes = [_vector(mesh.Node(i).Transformed(turn)) for i in range(1, mesh.NbNodes() + 1)]
-    order = (1, 3, 2) if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2, 3)
-    corners = [[mesh.Triangle(i).Value(k) - 1 for k in order] for i in range(1, mesh.NbTriangles() + 1)]
+    one, two = (2, 1) if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2)
+    numbers = [mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]
+    corners = [[three[0] - 1, three[one] - 1, three[two] - 1] for three in numbers]
     return {"nodes": nodes, "triangles": corners}
 
 
@@ -374,6 +375,7 @@ def _curve(edge: Any) -> dict[str, Any]:
 
 def main() -> int:
     """Read standard input, write standard output; what the kernel itself prints goes nowhere."""
+    gc.disable()  # it ends before memory matters, and loading the kernel makes a hundred thousand objects
     out = os.dup(1)
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
