@@ -23,12 +23,14 @@ from typing import Any
 FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
-_WAYS = ("", 1), ("healed", 1), ("", 2), ("healed", 2), ("splines", 1), ("splines", 2)
-"""What is done to the shape, and what the pieces of a turn are divided by; the first if all of them leave it open."""
+_WAYS = ("", 1), ("healed", 1), ("fine", 1), ("", 2), ("healed", 2), ("splines", 1), ("splines", 2)
+"""What is done to the shape, or how it is cut, and what the pieces of a turn are divided by; the first if all of them
+leave it open."""
 _NAMED = 12  # bodies in a message
 _DIGITS = 9  # of coordinates that are those of one node
 _FLAT = 1e-6  # of its length: how far a straight edge may be off a line
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
+_NEAREST = 1e-6  # mm: how near points of an edge may come; the kernel's own 0.01 mm lets boundaries cross
 
 
 class Unusable(Exception):
@@ -56,7 +58,7 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
             continue  # broken numbers, of which splines may be made for ever
         solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
-            found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted)
+            found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted, done)
         except Exception as error:  # the kernel's own are of many types; another way may do
             found, broken = [], error
         outcomes.append(bool(found))
@@ -90,9 +92,9 @@ def _faces(shape: Any) -> list[Any]:
     return _parts(_parts([shape], "TopAbs_SOLID", "Solid"), "TopAbs_FACE", "Face")
 
 
-def _divided(shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
+def _divided(shape: Any, cut: Any, pieces: int, done: str) -> list[dict[str, Any]]:
     """The faces of a shape, in triangles of so many pieces a turn of what is ``cut``: it, or it as splines."""
-    _cut(cut, pieces, controlled=cut is shape)
+    _cut(cut, pieces, done)
     every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
     if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
         raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(cut)}")
@@ -114,21 +116,19 @@ def _said(reader: Any) -> Callable[[Any], dict[str, Any]]:
     return said
 
 
-def _cut(shape: Any, pieces: int, controlled: bool) -> None:
-    """Cut a shape into triangles; where it is not controlled how near they come within a face the angle decides."""
+def _cut(shape: Any, pieces: int, done: str) -> None:
+    """Cut a shape into triangles; of splines the angle alone decides how near they come within a face."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
-
-    BRepTools.Clean_s(shape)
-    angle = 4 * math.pi / pieces
-    if controlled:
-        BRepMesh_IncrementalMesh(shape, _LINEAR, True, angle, False)
-        return
     from OCP.IMeshTools import IMeshTools_Parameters
     from OCP.Message import Message_ProgressRange
 
+    BRepTools.Clean_s(shape)
     how = IMeshTools_Parameters()
-    how.Deflection, how.Relative, how.Angle, how.ControlSurfaceDeflection = _LINEAR, True, angle, False
+    how.Deflection, how.Relative, how.Angle = _LINEAR, True, 4 * math.pi / pieces
+    how.ControlSurfaceDeflection = done != "splines"
+    if done == "fine":
+        how.MinSize = _NEAREST
     BRepMesh_IncrementalMesh(shape, how, Message_ProgressRange())
 
 
