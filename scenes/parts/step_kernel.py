@@ -24,8 +24,7 @@ FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
 _WAYS = ("", 1), ("healed", 1), ("fine", 1), ("", 2), ("healed", 2), ("splines", 1), ("splines", 2)
-"""What is done to the shape, or how it is cut, and what the pieces of a turn are divided by; the first if all of them
-leave it open."""
+"""What is done to the shape, or how it is cut, and what the pieces of a turn are divided by."""
 _NAMED = 12  # bodies in a message
 _DIGITS = 9  # of coordinates that are those of one node
 _FLAT = 1e-6  # of its length: how far a straight edge may be off a line
@@ -52,23 +51,30 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
         raise Unusable(_no_body(data, len(_parts([shape], "TopAbs_FACE", "Face"))))
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
-    outcomes: list[bool] = []
-    for done, divisor in (*_WAYS, _WAYS[0]):
-        if done == "splines" and outcomes and not any(outcomes):
+    solid, wanted, found = _closed(shape, pieces)
+    faces, said = _faces(solid), _said(reader)
+    found = [{**row, **said(face)} for row, face in zip(found, faces, strict=True)]
+    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces)}
+
+
+def _closed(shape: Any, pieces: int) -> tuple[Any, int, list[dict[str, Any]]]:
+    """The shape, the pieces of a turn and the faces by the first way that leaves no edge open; else by the first."""
+    first, is_cut = None, False
+    for done, divisor in _WAYS:
+        if done == "splines" and first and not is_cut:
             continue  # broken numbers, of which splines may be made for ever
         solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
         try:
             found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted, done)
         except Exception as error:  # the kernel's own are of many types; another way may do
-            found, broken = [], error
-        outcomes.append(bool(found))
-        if found and _is_closed(found):
-            break
-    if not found:
-        raise broken
-    faces, said = _faces(solid), _said(reader)
-    found = [{**row, **said(face)} for row, face in zip(found, faces, strict=True)]
-    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces)}
+            first = first or error
+            continue
+        if _is_closed(found):
+            return solid, wanted, found
+        first, is_cut = first or (solid, wanted, found), True
+    if isinstance(first, Exception):
+        raise first
+    return first
 
 
 def _no_body(data: bytes, faces: int = 0) -> str:
