@@ -12,6 +12,7 @@ from pathlib import Path
 import trimesh
 
 from scenes.errors import InvalidInput
+from scenes.parts.package import in_one_model
 
 MOST_BODIES = 10_000
 _NAMED = 12  # bodies in a message
@@ -32,6 +33,7 @@ def read(path: Path, data: bytes, most_triangles: int) -> tuple[dict[str, trimes
     if kind == "3mf" and find_spec("lxml") is None:
         raise InvalidInput(f"{_MISSING}, got {path}")
     {"glb": _check_glb, "3mf": _check_3mf}[kind](path, data, most_triangles)
+    data = in_one_model(data) if kind == "3mf" else data
     scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=None, **_HOW[kind])
     nodes = scene.graph.transforms.node_data.items()
     found = {node: scene.geometry[facts["geometry"]] for node, facts in nodes if "geometry" in facts}

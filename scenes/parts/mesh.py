@@ -90,20 +90,8 @@ def read(path: Path, scale: float | None = 1.0, unit: Unit = "mm", body: str | i
         factor = told if scale is None else scale
         if factor != 1:
             mesh.vertices *= factor
-    with np.errstate(all="ignore"), _uncollected():
+    with np.errstate(all="ignore"):
         return solid(mesh)
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Without a search for cycles among the many small records that are made: it takes up to a third of the time."""
-    was = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was:
-            gc.enable()
 
 
 def _check_told(path: Path, data: bytes, kind: str) -> None:
@@ -139,6 +127,19 @@ def _check_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
 Told = Callable[[np.ndarray, np.ndarray, np.ndarray], Facets]
 
 
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without a search for cycles among the many small records that are made: it takes up to a third of the time."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
+
+
+@_uncollected()
 def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
     """Solid from a mesh, mended where it is clear how (`scenes.parts.mend`).
 

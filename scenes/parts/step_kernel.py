@@ -9,6 +9,7 @@ targets) are left out. Exit status 2 with one line on standard error where the f
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import math
@@ -22,12 +23,13 @@ from typing import Any
 FORMAT = 2
 _FEWEST = 12  # pieces of a turn: fewer are a polygon's sides
 _ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)  # places of an edge at which the angle between its faces is asked
-_WAYS = ("", 1), ("healed", 1), ("", 2), ("healed", 2), ("splines", 1), ("splines", 2)
-"""What is done to the shape, and what the pieces of a turn are divided by; the first if all of them leave it open."""
+_WAYS = ("", 1), ("healed", 1), ("fine", 1), ("", 2), ("healed", 2), ("splines", 1), ("splines", 2)
+"""What is done to the shape, or how it is cut, and what the pieces of a turn are divided by."""
 _NAMED = 12  # bodies in a message
 _DIGITS = 9  # of coordinates that are those of one node
 _FLAT = 1e-6  # of its length: how far a straight edge may be off a line
 _LINEAR = 0.1  # of an edge's length: so coarse that the angle alone decides
+_NEAREST = 1e-6  # mm: how near points of an edge may come; the kernel's own 0.01 mm lets boundaries cross
 
 
 class Unusable(Exception):
@@ -49,23 +51,30 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
         raise Unusable(_no_body(data, len(_parts([shape], "TopAbs_FACE", "Face"))))
     curved = sum(1 for face in faces if _surface(face)["kind"] != "plane")
     pieces = max(_FEWEST, min(segments, (most_faces - len(faces)) // max(curved, 1)))
-    outcomes: list[bool] = []
-    for done, divisor in (*_WAYS, _WAYS[0]):
-        if done == "splines" and outcomes and not any(outcomes):
-            continue  # broken numbers, of which splines may be made for ever
-        solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
-        try:
-            found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted)
-        except Exception as error:  # the kernel's own are of many types; another way may do
-            found, broken = [], error
-        outcomes.append(bool(found))
-        if found and _is_closed(found):
-            break
-    if not found:
-        raise broken
+    solid, wanted, found = _closed(shape, pieces)
     faces, said = _faces(solid), _said(reader)
     found = [{**row, **said(face)} for row, face in zip(found, faces, strict=True)]
     return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces)}
+
+
+def _closed(shape: Any, pieces: int) -> tuple[Any, int, list[dict[str, Any]]]:
+    """The shape, the pieces of a turn and the faces by the first way that leaves no edge open; else by the first."""
+    first, is_cut = None, False
+    for done, divisor in _WAYS:
+        if done == "splines" and first and not is_cut:
+            continue  # broken numbers, of which splines may be made for ever
+        solid, wanted = _healed(shape) if done == "healed" else shape, max(_FEWEST, pieces // divisor)
+        try:
+            found = _divided(solid, _splined(shape) if done == "splines" else solid, wanted, done)
+        except Exception as error:  # the kernel's own are of many types; another way may do
+            first = first or error
+            continue
+        if _is_closed(found):
+            return solid, wanted, found
+        first, is_cut = first or (solid, wanted, found), True
+    if isinstance(first, Exception):
+        raise first
+    return first
 
 
 def _no_body(data: bytes, faces: int = 0) -> str:
@@ -89,9 +98,9 @@ def _faces(shape: Any) -> list[Any]:
     return _parts(_parts([shape], "TopAbs_SOLID", "Solid"), "TopAbs_FACE", "Face")
 
 
-def _divided(shape: Any, cut: Any, pieces: int) -> list[dict[str, Any]]:
+def _divided(shape: Any, cut: Any, pieces: int, done: str) -> list[dict[str, Any]]:
     """The faces of a shape, in triangles of so many pieces a turn of what is ``cut``: it, or it as splines."""
-    _cut(cut, pieces, controlled=cut is shape)
+    _cut(cut, pieces, done)
     every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
     if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
         raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(cut)}")
@@ -113,21 +122,19 @@ def _said(reader: Any) -> Callable[[Any], dict[str, Any]]:
     return said
 
 
-def _cut(shape: Any, pieces: int, controlled: bool) -> None:
-    """Cut a shape into triangles; where it is not controlled how near they come within a face the angle decides."""
+def _cut(shape: Any, pieces: int, done: str) -> None:
+    """Cut a shape into triangles; of splines the angle alone decides how near they come within a face."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
     from OCP.BRepTools import BRepTools
-
-    BRepTools.Clean_s(shape)
-    angle = 4 * math.pi / pieces
-    if controlled:
-        BRepMesh_IncrementalMesh(shape, _LINEAR, True, angle, False)
-        return
     from OCP.IMeshTools import IMeshTools_Parameters
     from OCP.Message import Message_ProgressRange
 
+    BRepTools.Clean_s(shape)
     how = IMeshTools_Parameters()
-    how.Deflection, how.Relative, how.Angle, how.ControlSurfaceDeflection = _LINEAR, True, angle, False
+    how.Deflection, how.Relative, how.Angle = _LINEAR, True, 4 * math.pi / pieces
+    how.ControlSurfaceDeflection = done != "splines"
+    if done == "fine":
+        how.MinSize = _NEAREST
     BRepMesh_IncrementalMesh(shape, how, Message_ProgressRange())
 
 
@@ -149,14 +156,13 @@ def _healed(shape: Any) -> Any:
 
 def _is_closed(faces: list[dict[str, Any]]) -> bool:
     """Whether triangles pass each edge as often one way as the other."""
-    passed: Counter[tuple[Any, Any]] = Counter()
+    numbers: dict[tuple[float, ...], int] = {}
+    passed: Counter[tuple[int, int]] = Counter()
     for face in faces:
-        nodes = [tuple(round(x, _DIGITS) for x in node) for node in face["nodes"]]
-        for triangle in face["triangles"]:
-            a, b, c = (nodes[k] for k in triangle)
-            for one, other in ((a, b), (b, c), (c, a)):
-                passed[min(one, other), max(one, other)] += (one < other) - (other < one)
-    return not any(passed.values())
+        places = (tuple(round(x, _DIGITS) for x in node) for node in face["nodes"])
+        nodes = [numbers.setdefault(place, len(numbers)) for place in places]
+        passed.update((nodes[i], nodes[k]) for a, b, c in face["triangles"] for i, k in ((a, b), (b, c), (c, a)))
+    return all(passed[end, start] == count for (start, end), count in passed.items())
 
 
 def _read(data: bytes) -> tuple[Any, Any]:
@@ -257,8 +263,9 @@ def _triangles(face: Any) -> dict[str, Any]:
     mesh = _mesh(face, location)
     turn = location.Transformation()
     nodes = [_vector(mesh.Node(i).Transformed(turn)) for i in range(1, mesh.NbNodes() + 1)]
-    order = (1, 3, 2) if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2, 3)
-    corners = [[mesh.Triangle(i).Value(k) - 1 for k in order] for i in range(1, mesh.NbTriangles() + 1)]
+    one, two = (2, 1) if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2)
+    numbers = [mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)]
+    corners = [[three[0] - 1, three[one] - 1, three[two] - 1] for three in numbers]
     return {"nodes": nodes, "triangles": corners}
 
 
@@ -374,6 +381,7 @@ def _curve(edge: Any) -> dict[str, Any]:
 
 def main() -> int:
     """Read standard input, write standard output; what the kernel itself prints goes nowhere."""
+    gc.disable()  # it ends before memory matters, and loading the kernel makes a hundred thousand objects
     out = os.dup(1)
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)

@@ -40,15 +40,19 @@ def glb(tmp_path):
 
 def three_mf(path, unit):
     """The same, written out."""
-    objects = ""
-    for number, (name, body) in enumerate(two().items(), 1):
-        corners = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*at) for at in body.vertices)
-        faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*face) for face in body.faces)
-        inside = f"<mesh><vertices>{corners}</vertices><triangles>{faces}</triangles></mesh>"
-        objects += f'<object id="{number}" name="{name}" type="model">{inside}</object>'
+    objects = object_of("block", 1) + object_of("pin", 2)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("3D/3dmodel.model", MODEL.format(unit=unit, objects=objects))
     return path
+
+
+def object_of(name, number):
+    """One of the two as 3MF has it."""
+    body = two()[name]
+    corners = "".join('<vertex x="{}" y="{}" z="{}"/>'.format(*at) for at in body.vertices)
+    faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*face) for face in body.faces)
+    inside = f"<mesh><vertices>{corners}</vertices><triangles>{faces}</triangles></mesh>"
+    return f'<object id="{number}" name="{name}" type="model">{inside}</object>'
 
 
 def check(read, scale=1.0):
@@ -137,6 +141,54 @@ def test_3mf(tmp_path, unit, millimetres):
     path = three_mf(tmp_path / "two.3mf", unit)
     check(lambda body: mesh.read(path, None, "mm", body), millimetres)
     check(lambda body: mesh.read(path, None, "mm", {"block": 1, "pin": 2}.get(body)), millimetres)
+
+
+PACKED = """<?xml version="1.0"?>
+<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" requiredextensions="{needed}"
+ xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+ xmlns:b="http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02">
+<resources>{objects}</resources><build>{items}</build></model>"""
+ASIDE = 'transform="1 0 0 0 1 0 0 0 1 30 0 0"'
+
+
+def package(path, items, root="", needed="p", **parts):
+    """A 3MF package: items and objects of its first model, and objects of others."""
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("3D/3dmodel.model", PACKED.format(objects=root, items=items, needed=needed))
+        for name, objects in parts.items():
+            archive.writestr(f"3D/Objects/{name}.model", PACKED.format(objects=objects, items="", needed="p"))
+    return path
+
+
+def component(number, part="", more=""):
+    where = f'p:path="/3D/Objects/{part}.model"' if part else ""
+    return f'<components><component objectid="{number}" {where} {more}/></components>'
+
+
+@lxml
+def test_a_3mf_may_have_its_objects_in_other_parts(tmp_path):
+    """Items of two parts, whose objects have the same number; objects of one part, in objects of the first model."""
+    own = "".join(f'<item objectid="{n}" p:path="/3D/Objects/{part}.model"/>' for n, part in ((1, "a"), (2, "B")))
+    inner = f'<object id="2" type="model">{component(1, more=ASIDE)}</object>'
+    items = package(tmp_path / "items.3mf", own, a=object_of("block", 1), b=inner + object_of("pin", 1))
+    check(lambda body: mesh.read(items, None, "mm", body))
+    outer = f'<object id="1" type="model">{component(2, "both", ASIDE)}</object>'
+    outer += f'<object id="2" type="model">{component(1, "both")}</object>'
+    both = object_of("block", 1) + object_of("pin", 2)
+    objects = package(tmp_path / "objects.3mf", '<item objectid="1"/><item objectid="2"/>', outer, both=both)
+    check(lambda body: mesh.read(objects, None, "mm", body))
+
+
+@lxml
+def test_a_3mf_that_cannot_be_read_says_why(tmp_path):
+    item = '<item objectid="1" p:path="/3D/Objects/a.model"/>'
+    for name, more, match in (
+        ("part.3mf", {}, r"part.3mf \(no part '3d/objects/a.model' in it\)"),
+        ("object.3mf", {"a": object_of("pin", 7)}, r"object.3mf \(no object 1 in a part that is to have it\)"),
+        ("beams.3mf", {"needed": "p b"}, r"it requires extensions that are not read: http://\S+/beamlattice/2017/02\)"),
+    ):
+        with pytest.raises(InvalidInput, match=match):
+            mesh.read(package(tmp_path / name, item, **more))
 
 
 def test_what_cannot_be_chosen(glb, tmp_path):

@@ -250,6 +250,18 @@ def test_a_part_cut_as_splines_is_the_same_part(tmp_path, monkeypatch):
     assert exact < volume < exact + 1.5 * chords
 
 
+@kernel
+def test_a_part_cut_finely_has_as_many_pieces_of_each_turn(tmp_path, monkeypatch):
+    """Of a bore of 0.04 mm, too, whose points are nearer to each other than the kernel lets them be by itself."""
+    from tests.step_parts import drilled, written
+
+    data = written(drilled((1.0, 1.0, 0.5), [(0.3, 0.4, 0.02)]), tmp_path / "small.step").read_bytes()
+    monkeypatch.setattr(step_kernel, "_WAYS", (("fine", 1),))
+    record = step_kernel.record(data, 96, 2000)
+    counts = {face["kind"]: len(face["triangles"]) for face in record["faces"]}
+    assert counts["cylinder"] == 2 * 96
+
+
 def test_a_cone_has_the_radius_of_its_middle():
     """From 1 at its first end to 5 at its last; the file's own point is where it is 1, and may be its tip."""
     made = step._cone(np.array([7.0, 0, 0]), np.array([0, 0, 1.0]), 1.0, math.atan(0.5), [0.0, 8.0], True)

@@ -27,11 +27,12 @@ _came: list[int] = []  # signals: some libraries keep but the text of an error t
 
 def main() -> None:
     """Entry point. Little is loaded before it begins, so that it is in charge when something goes wrong."""
-    from validation.cli.memory import keep_freed
+    from validation.cli.memory import collect_seldom, keep_freed, leave_all
     from validation.cli.streams import make_usable
 
     make_usable()
     keep_freed()
+    collect_seldom()
     code = 3
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -45,6 +46,7 @@ def main() -> None:
         code = _told(_cause(error))
     finally:
         _again(None)
+    leave_all()
     sys.exit(code)
 
 
