@@ -192,7 +192,9 @@ def budget(
 
 def _noise(pictures: Pictures, told: Prediction, *, biased: bool) -> np.ndarray:
     """Variances (M,) of the values by pixel noise, the scene's unit squared or degrees^2."""
-    return np.array([each.variance_object for each in told.measurands]) if biased else arranged_variances(pictures)
+    if biased or not is_arranged(pictures.scene):
+        return np.array([each.variance_object for each in told.measurands])
+    return arranged_variances(pictures)
 
 
 def _checked(name: str, values: Any, picture: Picture) -> np.ndarray | None:
