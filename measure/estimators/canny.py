@@ -104,7 +104,8 @@ class CannyLocator:
     def may_jump(self, points: EdgePoints, clean: np.ndarray) -> bool:
         """Whether noise may give or take points that lie beside the line through those of a noise-free image."""
         thinning, line = self._alone.thinning, fit_lines(points, points.weights)
-        kept = replace(thinning, threshold=max(thinning.threshold - _BY_NOISE * self._noise, self._noise))(clean[None])
+        noise = _gradient_noise(self.optics, self.kernel)
+        kept = replace(thinning, threshold=max(thinning.threshold - _BY_NOISE * noise, noise))(clean[None])
         row, column = np.nonzero(kept.kept[0])
         seen = np.stack([column + thinning.columns.start, row + thinning.rows.start], -1)
         along, offset = self.caliper.coordinates(self.optics.ideal(seen.astype(float)))
@@ -173,12 +174,8 @@ class CannyLocator:
         """
         first, last = self.caliper.positions[[0, -1]]
         half = np.linspace(start + trend * np.where(trend > 0, first, last), start + trend * (first + last) / 2, 5)
-        return ndtr((self.threshold - half) / max(self._noise, 1e-9 * self.threshold)).mean(0) < _LOST
-
-    @property
-    def _noise(self) -> float:
-        """Standard deviation of the gradient by noise, grey levels a pixel."""
-        return float(np.sqrt(self.optics.noise_variance) * np.linalg.norm(self.kernel[:, 0]))
+        noise = _gradient_noise(self.optics, self.kernel)
+        return ndtr((self.threshold - half) / max(noise, 1e-9 * self.threshold)).mean(0) < _LOST
 
     @property
     def _radius(self) -> int:
@@ -214,6 +211,11 @@ class CannyLocator:
         blur = max(float(self.optics.blur_at(self.optics.recorded(middle))), 0.3)
         image.flat[pixels] = self._step * half_plane(across / blur) @ NODE_WEIGHTS
         return image
+
+
+def _gradient_noise(optics: Optics, kernel: np.ndarray) -> float:
+    """Standard deviation of the gradient across an edge by noise, grey levels a pixel."""
+    return float(np.sqrt(optics.noise_variance) * np.linalg.norm(kernel[:, 0]))
 
 
 def thinnings(optics: Optics, calipers: list[Caliper], threshold: float) -> list[Thinning]:

@@ -192,9 +192,11 @@ def budget(
 
 def _noise(pictures: Pictures, told: Prediction, *, biased: bool) -> np.ndarray:
     """Variances (M,) of the values by pixel noise, the scene's unit squared or degrees^2."""
+    variances = np.array([each.variance_object for each in told.measurands])
     if biased or not is_arranged(pictures.scene):
-        return np.array([each.variance_object for each in told.measurands])
-    return arranged_variances(pictures)
+        return variances
+    found = arranged_variances(pictures)
+    return np.where(np.isfinite(found), found, variances)
 
 
 def _checked(name: str, values: Any, picture: Picture) -> np.ndarray | None:

@@ -21,6 +21,7 @@ OPTIONAL = {
     "OCP": "cadquery-ocp-novtk",
     "pandas": "frames",
     "aiohttp": "aiohttp",
+    "lxml": "lxml",
 }  # extras, imported only where they are asked for
 
 
