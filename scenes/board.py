@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from scenes.board_print import dark_outlines, numbered, triangles
+from scenes.board_print import dark_outlines, marker_corners, numbered, triangles
 from scenes.markers import bright_cells
 from scenes.model import Model
 from scenes.ranges import Coordinate, Fraction, Length, Spread
@@ -151,10 +151,9 @@ class Board(Model):
     @property
     def places(self) -> np.ndarray:
         """The same on the board, (n, 2)."""
-        found = numbered(*self.shape)
         if self.kind != "markers":
-            return found
-        return (found[:, None] + self.share * numbered(2, 2)).reshape(-1, 2)
+            return numbered(*self.shape)
+        return marker_corners(*self.shape, self.share).reshape(-1, 2)
 
     @property
     def by_pitch(self) -> np.ndarray:

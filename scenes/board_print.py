@@ -25,6 +25,11 @@ def numbered(columns: int, rows: int) -> np.ndarray:
     return found
 
 
+def marker_corners(columns: int, rows: int, share: float) -> np.ndarray:
+    """Four corners of each marker of a grid, row by row, (n, 4, 2); a side is such a share of the way to the next."""
+    return numbered(columns, rows)[:, None] + share * numbered(2, 2)
+
+
 def dark_outlines(board: Board) -> np.ndarray:
     """Corners (m, k, 2) of what is dark, counterclockwise; dots as polygons of the same area. A marker's bright cells
     lie in its dark square, clockwise."""

@@ -18,7 +18,7 @@ from imaging import sensor
 from imaging.boards.dot_fitting import dot_expected, dot_reach
 from imaging.boards.fitting import crossing_rows
 from imaging.boards.saddle import response
-from imaging.boards.windows import Marked, Windows, wedges, windows
+from imaging.boards.windows import INWARD, Marked, Windows, wedges, windows
 from imaging.boards.windows import steps as ways
 from imaging.features.displaced import points_by_deviations
 from imaging.features.seen import Seen
@@ -250,8 +250,7 @@ def wedge(quad: np.ndarray, blur: float, gap: float, cell: float) -> np.ndarray:
     size = int(np.ceil(np.ptp(corners, axis=0).max())) + 2 * int(_MARGIN) + 2
     toward = ways(here).reshape(-1, 2, 2)
     turn = np.sign(toward[:, 0, 0] * toward[:, 1, 1] - toward[:, 0, 1] * toward[:, 1, 0])
-    inward = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1)])
-    one, other = turn * inward[:, 1], -turn * inward[:, 0]  # sides of both edges on which it is dark
+    one, other = turn * INWARD[:, 1], -turn * INWARD[:, 0]  # sides of both edges on which it is dark
     window = wedges(np.zeros((size, size)), here[None], gap, cell, blur)
     return _fitted(window, here.reshape(-1, 2), toward, blur, -np.stack([one, other, one * other], -1) / 4)
 

@@ -15,6 +15,8 @@ _BAND = 5.0  # px beside an edge: further away only levels are told
 FEWEST = 40  # pixels of a window that can be fitted
 _NARROWEST = 3.0  # px: half a square
 _FOUR = 4  # points of a homography
+INWARD = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1)])
+"""Into a marker from each of its corners, row by row."""
 _CLEAR = 3.0  # standard deviations of blur and pixel: 0.13 % of a marker's contrast is left
 
 
@@ -125,8 +127,7 @@ def wedges(image: np.ndarray, quads: np.ndarray, gap: float, cell: float, blur: 
     """
     toward = np.array([steps(quad) for quad in quads]).reshape(-1, 2, 2)
     seen = _Around.of(image, quads.reshape(-1, 2), toward)
-    inward = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1)])
-    into = seen.away * np.tile(inward, (len(quads), 1))[:, None]
+    into = seen.away * np.tile(INWARD, (len(quads), 1))[:, None]
     clear, apart = _clear(blur), seen.apart[:, None]
     own = ((into < _HALF) & (into > -gap / 2) & ((into + gap) * apart > clear)).all(-1)
     own &= ((into < 0) | ((into - cell) * apart < -clear)).any(-1)

@@ -16,7 +16,7 @@ from measure.boards.bend import bends
 from measure.boards.noise import check_noise, of_board
 from scenes import status
 from scenes.arrays import picture
-from scenes.board_print import numbered
+from scenes.board_print import marker_corners, numbered
 from scenes.errors import InvalidInput
 
 _FALSE_ALARM = 0.01  # of all corners of a board together
@@ -75,8 +75,9 @@ class Board:
     @property
     def places(self) -> np.ndarray:
         """Column and row of each corner on the board, shape (n, 2): to be multiplied by the squares' size."""
-        found = numbered(*self.shape)
-        return (found[:, None] + self.marker * numbered(2, 2)).reshape(-1, 2) if self.marker else found
+        if not self.marker:
+            return numbered(*self.shape)
+        return marker_corners(*self.shape, self.marker).reshape(-1, 2)
 
 
 def chessboard(image: Any, shape: tuple[int, int] | None = None, noise: float | None = None) -> Board:

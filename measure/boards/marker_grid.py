@@ -15,7 +15,7 @@ from measure.boards.chessboard import Board, check_shape, measured
 from measure.boards.noise import check_noise
 from measure.boards.reading import Legible
 from scenes.arrays import picture
-from scenes.board_print import numbered
+from scenes.board_print import marker_corners
 from scenes.errors import InvalidInput
 from scenes.markers import read_dictionary
 
@@ -98,7 +98,7 @@ class Markers:
     @property
     def places(self) -> np.ndarray:
         """Of the markers' corners on the board, in ways from one marker to the next, shape (n, 4, 2)."""
-        return numbered(self.columns, self.rows)[:, None] + self.side * numbered(2, 2)
+        return marker_corners(self.columns, self.rows, self.side)
 
     def sorted(self, seen: list[tuple[int, np.ndarray]]) -> np.ndarray:
         """The grid of markers that are seen, (number, corners (4, 2), clockwise) each; NaN where none is.

@@ -191,8 +191,8 @@ class BoardTool:
         board = self.board
         if board.kind == "dots":
             return ()
-        layout = Markers(board.share, board.cells, *board.shape) if board.kind == "markers" else None
-        layout = layout or Squares(marked_beside(board))
+        tags = board.kind == "markers"
+        layout = Markers(board.share, board.cells, *board.shape) if tags else Squares(marked_beside(board))
         return layout, layout.bends(self.grid)
 
     def points(self, found: MeasuredBoard) -> tuple[np.ndarray, np.ndarray]:
