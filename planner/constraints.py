@@ -9,11 +9,13 @@ import numpy as np
 
 from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import direction, light_position, project
+from imaging.geometry.rays import reaches
 from imaging.pictures import Pictures
 from scenes import InvalidInput, Pose, Scene
 
 WHOLE = (0.0, 180.0)  # polar angles of the sphere
 _BODY = 0.05  # of the distance: radius of a body of which nothing is said
+_CAP = 1e-4  # of the part's size, squared: smaller places that its file leaves open may be seen
 Region = tuple[float, float, float]  # polar, azimuth, radius, degrees
 
 
@@ -96,9 +98,11 @@ class Constraints:
         return self.light_out_of_view or self.min_separation_deg > 0 or self.same_mount
 
     def sensors(self, scene: Scene, poses: np.ndarray) -> np.ndarray:
-        """Which sensor poses (n, 2) are allowed; bool, shape (n,)."""
+        """Which sensor poses (n, 2) are allowed, bool (n,); none that sees what the part's file leaves open."""
         allowed = _polar(poses, self.sensor_polar_deg) & _outside(poses, self.forbidden_sensor)
         allowed &= _around(poses, self.sensor_azimuth_deg)
+        if scene.solid.caps:
+            allowed &= ~_sees_caps(scene, poses)
         if self.min_edge_px > 0 or self.min_clearance_px > 0:
             view = projected_edges(Pictures.of(scene, poses))
             allowed &= (view.usable >= self.min_edge_px).all(-1) & view.visible.all(-1)
@@ -160,6 +164,16 @@ def _around(poses: np.ndarray, limits: tuple[float, float] | None) -> np.ndarray
     if limits is None:
         return np.ones(len(poses), bool)
     return ((poses[:, 1] - limits[0] + 1e-9) % 360 <= turn_of(limits) + 2e-9) | (poses[:, 0] < 1e-9)
+
+
+def _sees_caps(scene: Scene, poses: np.ndarray) -> np.ndarray:
+    """Which sensor poses (n, 2) see a face that closes what the part's file leaves open; bool, shape (n,)."""
+    solid = scene.solid
+    wide = [face for face in solid.caps if solid.areas[face] >= _CAP * solid.extent**2]
+    shown = np.isin(solid.triangle_faces, wide)
+    points, faces = solid.triangles[shown].mean(1), solid.triangle_faces[shown]
+    at = Pictures.of(scene, poses).viewpoint.widened().origins(points)
+    return reaches(solid, points, faces, at).any(-1)
 
 
 def turn_of(azimuths: tuple[float, float]) -> float:

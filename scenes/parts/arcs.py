@@ -40,7 +40,8 @@ def arcs(solid: Solid) -> tuple[Circle, ...]:
     (['c1', 'c2'], [180, 180], False)
     """
     whole = {name for circle in solid.circles for name in circle.edges}
-    owner = {frozenset(edge.ends): edge for edge in solid.edges if edge.kind == "rim" and edge.name not in whole}
+    curved = (edge for edge in solid.edges if edge.kind == "rim" and edge.name not in whole)
+    owner = {frozenset(edge.ends): edge for edge in curved if not set(edge.faces) & set(solid.caps)}
     found: list[tuple[tuple[float, ...], Circle]] = []
     for face in np.flatnonzero(solid.plane).tolist() if owner else ():
         loops = (solid.faces[face], *(solid.holes[face] if solid.holes else ()))

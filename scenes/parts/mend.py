@@ -1,4 +1,5 @@
-"""Triangles as files have them, brought to a closed surface: doubled ones, gaps, T-junctions, slits, shells turned."""
+"""Triangles as files have them, brought to a closed surface: doubled ones, gaps, T-junctions, slits, holes, shells
+turned."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from scenes.errors import InvalidInput
+from scenes.parts.caps import caps
 from scenes.parts.rows import different
 
 _GAP = 1e-5  # of the part's size: open edges that lie closer are one
@@ -26,12 +28,14 @@ _SAID = 3  # places of open edges
 def mended(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
     """A closed, outwards oriented surface in which every edge belongs to two triangles, and what was done to get it.
 
-    Its ``face_attributes["source"]`` are the numbers of the triangles that were there.
+    Its ``face_attributes["source"]`` are the numbers of the triangles that were there, those beside them for what
+    fills holes; ``["cap"]`` are which place that the file leaves open (`scenes.parts.caps`) a triangle closes, from 1,
+    or 0.
 
     Raises
     ------
     InvalidInput
-        If it stays open; the message says where. If it encloses nothing.
+        If too much is open, or it cannot be closed; the message says where. If it encloses nothing.
 
     Examples
     --------
@@ -41,10 +45,10 @@ def mended(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
     ('inverted shells turned: 1',)
     """
     mesh.merge_vertices()
-    mesh.face_attributes["source"] = np.arange(len(mesh.faces))
+    mesh.face_attributes.update(source=np.arange(len(mesh.faces)), cap=np.zeros(len(mesh.faces), int))
     said: list[str] = []
     whole = mesh.is_watertight and mesh.is_winding_consistent
-    ways = _without_doubled, _closed_gaps, _divided, _filled, _one_way, _parted, _outwards
+    ways = _without_doubled, _closed_gaps, _divided, _filled, _one_way, _capped, _parted, _outwards
     for step in ways[-1:] if whole else ways:
         mesh, done = step(mesh)
         said += done
@@ -188,11 +192,28 @@ def _one_way(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
         return mesh, []
     turned = _of(mesh, mesh.vertices, mesh.faces.copy(), np.arange(len(mesh.faces)))
     trimesh.repair.fix_winding(turned)
-    left = _open(turned.faces)
-    if len(left):
-        raise InvalidInput(f"object.file must be a closed surface, got open edges: {_places(turned, left)}")
     count = int((mesh.faces != turned.faces).any(1).sum())
-    return turned, [f"triangles that looked the other way turned: {min(count, len(mesh.faces) - count)}"]
+    count = min(count, len(mesh.faces) - count)
+    return turned, [f"triangles that looked the other way turned: {count}"] if count else []
+
+
+def _capped(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
+    """What is open closed by triangles of which nobody knows whether they are there."""
+    left = _open(mesh.faces)
+    if not len(left):
+        return mesh, []
+    halves = _halves(mesh.faces)
+    _, which = different(np.sort(halves, 1))
+    alone = np.flatnonzero(np.bincount(which)[which] == 1)
+    added = caps(mesh.vertices, halves[alone][:, ::-1]) if len(left) <= _MOST_OPEN else []
+    new = np.concatenate([np.zeros((0, 3), int), *added])
+    beside = dict(zip(halves[alone, 1].tolist(), (alone % len(mesh.faces)).tolist(), strict=True))
+    rows = np.array([beside[corner] for corner in new[:, 0].tolist()], int)
+    found = _of(mesh, mesh.vertices, np.concatenate([mesh.faces, new]), np.append(np.arange(len(mesh.faces)), rows))
+    found.face_attributes["cap"][len(mesh.faces) :] = np.repeat(range(1, len(added) + 1), [len(cap) for cap in added])
+    if len(_open(found.faces)):
+        raise InvalidInput(f"object.file must be a closed surface, got open edges: {_places(mesh, left)}")
+    return found, [f"holes closed: {len(added)}, of open edges: {_places(mesh, left)}"]
 
 
 def _outwards(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
@@ -284,8 +305,8 @@ def _around(mesh: trimesh.Trimesh, halves: np.ndarray) -> Iterator[tuple[int, in
 
 def _of(mesh: trimesh.Trimesh, vertices: np.ndarray, faces: np.ndarray, rows: np.ndarray) -> trimesh.Trimesh:
     """Triangles that were made of those of a mesh in ``rows``."""
-    source = {"source": mesh.face_attributes["source"][rows]}
-    found = trimesh.Trimesh(vertices, faces, face_attributes=source, process=False)
+    carried = {name: values[rows] for name, values in mesh.face_attributes.items()}
+    found = trimesh.Trimesh(vertices, faces, face_attributes=carried, process=False)
     found.remove_unreferenced_vertices()
     return found
 

@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from scenes.errors import InvalidInput
 from scenes.files.door import Unreadable, read_bytes
-from scenes.parts import bodies
+from scenes.parts import bodies, caps
 from scenes.parts.arcs import arcs
 from scenes.parts.chains import Chain
 from scenes.parts.facets import Facets, facets
@@ -152,7 +152,7 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
     Raises
     ------
     InvalidInput
-        If the surface is not closed; the message says where.
+        If the surface cannot be closed; the message says where.
 
     Examples
     --------
@@ -177,13 +177,20 @@ def solid(mesh: trimesh.Trimesh, told: Told | None = None) -> Solid:
         known = facets(vertices, chains, normals, areas, circular)
     else:
         known = _told(told, mesh, group, chains, circular)
+    filled = ~np.isin(np.arange(len(loops)), group[mesh.face_attributes["cap"] == 0])
+    capped = caps.unknown(chains, normals, filled)
+    if capped.any():
+        known, circular = caps.bordered(known, chains, capped), caps.clear_of(circular, chains, capped)
     circular = _edged(circular, chains, known.smooth)
     whole = joined(vertices, chains, normals, known.beside, known.kinds == "sharp")
     pieces = [(chain, "sharp") for chain in whole]
     pieces += [(chain, kind) for chain, kind in zip(chains, known.kinds.tolist(), strict=True) if kind != "sharp"]
     used = np.unique([end for chain in chains for end in chain[0]])
     plain = _assembled(mesh, group, used, pieces, loops, circular)
-    found = replace(plain, mended=said, triangle_sources=mesh.face_attributes["source"], regions=known.region)
+    found = replace(
+        plain, mended=(*said, *caps.said(mesh, group, capped)), triangle_sources=mesh.face_attributes["source"],
+        regions=known.region, caps=tuple(np.flatnonzero(capped).tolist()),
+    )  # fmt: skip
     return replace(found, arcs=arcs(found))
 
 

@@ -57,11 +57,11 @@ def boundaries(
     for a, b in halves:
         if (b, a) not in there:
             after.setdefault(a, []).append(b)
-    loops = [tuple(v for v in loop if kept[v]) for loop in _simple(after)]
+    loops = [tuple(v for v in loop if kept[v]) for loop in simple_loops(after)]
     return loops if len(loops) == 1 else sorted(loops, key=lambda loop: -_area(vertices[list(loop)], normal))
 
 
-def _simple(after: dict[int, list[int]]) -> list[list[int]]:
+def simple_loops(after: dict[int, list[int]]) -> list[list[int]]:
     """Loops along the ways from each vertex, which are used up; two that touch in a vertex are told apart there."""
     loops = []
     while after:

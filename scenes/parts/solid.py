@@ -155,6 +155,8 @@ class Solid:
         plane faces. Where not given, faces at a smooth edge are facets.
     arcs : tuple of Circle
         Circular edges that are no whole circles.
+    caps : tuple of int
+        Numbers of the faces that close what a file leaves open: nobody knows what is there.
     """
 
     vertex_names: tuple[str, ...]
@@ -171,6 +173,7 @@ class Solid:
     mended: tuple[str, ...] = ()
     regions: np.ndarray | None = None
     arcs: tuple[Circle, ...] = ()
+    caps: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.face_names:

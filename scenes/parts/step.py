@@ -94,6 +94,8 @@ class StepPart:
     triangle_faces : ndarray of int, shape (T,)
     places : tuple of int
         Which instance of the file each face is, counted from 0; -1 where that is not known.
+    mended : tuple of str
+        What was done to get there.
     """
 
     names: tuple[str, ...]
@@ -102,6 +104,7 @@ class StepPart:
     triangles: np.ndarray
     triangle_faces: np.ndarray
     places: tuple[int, ...] = ()
+    mended: tuple[str, ...] = ()
 
     @cached_property
     def solid(self) -> Solid:
@@ -117,7 +120,8 @@ class StepPart:
             found = mesh.solid(body, self._facets)
         circles = tuple(exact or circle for circle, exact in self._exact(found.circles, found.extent))
         arcs = tuple(exact for _, exact in self._exact(found.arcs, found.extent) if exact)  # others are of splines
-        return replace(found, face_names=self._face_names(found), circles=circles, arcs=arcs)
+        mended = (*self.mended, *found.mended)
+        return replace(found, face_names=self._face_names(found), circles=circles, arcs=arcs, mended=mended)
 
     def _facets(self, ends: np.ndarray, sources: np.ndarray, of_faces: np.ndarray) -> Facets:
         """What chains (C, 2, 3) between triangles ``sources`` (C, 2) are; faces by a triangle each, (F,)."""
@@ -178,15 +182,17 @@ class StepPart:
         return exact_walls(self.solid, self._owners(self.solid), self.surfaces, self.names)
 
     def _owners(self, solid: Solid) -> np.ndarray:
-        """The part's face that each plane face of the solid belongs to, shape (F,)."""
+        """The part's face that each plane face of the solid belongs to, shape (F,); -1 of what closes open places."""
         _, first = np.unique(solid.triangle_faces, return_index=True)
-        return self.triangle_faces[solid.triangle_sources[first]]
+        found = self.triangle_faces[solid.triangle_sources[first]]
+        found[list(solid.caps)] = -1
+        return found
 
     def _face_names(self, solid: Solid) -> tuple[str, ...]:
         names, given = list(solid.face_names), set(solid.face_names)
         counts: dict[str, int] = {}
         for face, owner in enumerate(self._owners(solid).tolist()):
-            name = self.names[owner]
+            name = self.names[owner] if owner >= 0 else ""
             if not name:
                 continue
             counts[name] = counts.get(name, 0) + 1
@@ -260,7 +266,9 @@ def part(record: dict[str, Any], unit: Unit = "mm") -> StepPart:
         raise InvalidInput(f"object.file must be a record of format {step_kernel.FORMAT}, got {record.get('format')!r}")
     scale = in_unit(1.0, record["unit"], unit)
     faces, edges = record["faces"], record["edges"]
-    corners = [scale * np.array(face["nodes"])[np.array(face["triangles"], int).reshape(-1, 3)] for face in faces]
+    nodes = [scale * np.array(face["nodes"]).reshape(-1, 3) for face in faces]
+    corners = [at[np.array(face["triangles"], int).reshape(-1, 3)] for at, face in zip(nodes, faces, strict=True)]
+    uncut = record.get("uncut")
     return StepPart(
         names=_face_names([face["name"] for face in faces]),
         surfaces=tuple(_surface(face, scale) for face in faces),
@@ -268,6 +276,7 @@ def part(record: dict[str, Any], unit: Unit = "mm") -> StepPart:
         triangles=np.concatenate(corners),
         triangle_faces=np.repeat(np.arange(len(faces)), [len(c) for c in corners]),
         places=tuple(face.get("place", -1) for face in faces),
+        mended=(f"faces that cannot be cut into triangles left open: {uncut}",) if uncut else (),
     )
 
 

@@ -39,7 +39,8 @@ class Unusable(Exception):
 def record(data: bytes, segments: int, most_faces: int, body: str | int | None = None) -> dict[str, Any]:
     """Faces on their surfaces, edges on their curves, and triangles of ``segments`` pieces a turn.
 
-    Where these leave the surface open, of a healed shape, or of fewer pieces.
+    Where these leave the surface open, of a healed shape, or of fewer pieces; a face that cannot be cut by any of these
+    ways has none, and ``uncut`` says how many such there are and where.
     """
     reader, shape = _read(data)
     if body is not None:
@@ -54,7 +55,9 @@ def record(data: bytes, segments: int, most_faces: int, body: str | int | None =
     solid, wanted, found = _closed(shape, pieces)
     faces, said = _faces(solid), _said(reader)
     found = [{**row, **said(face)} for row, face in zip(found, faces, strict=True)]
-    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces)}
+    uncut = [face for face, row in zip(faces, found, strict=True) if not row["triangles"]]
+    told = {"uncut": f"{len(uncut)}, {_named(uncut[0])}"} if uncut else {}
+    return {"format": FORMAT, "unit": "mm", "segments": wanted, "faces": found, "edges": _edges(faces), **told}
 
 
 def _closed(shape: Any, pieces: int) -> tuple[Any, int, list[dict[str, Any]]]:
@@ -73,8 +76,18 @@ def _closed(shape: Any, pieces: int) -> tuple[Any, int, list[dict[str, Any]]]:
             return solid, wanted, found
         first, is_cut = first or (solid, wanted, found), True
     if isinstance(first, Exception):
-        raise first
+        return _partly(shape, pieces, first)
     return first
+
+
+def _partly(shape: Any, pieces: int, why: Exception) -> tuple[Any, int, list[dict[str, Any]]]:
+    """The same where few faces of the solids cannot be cut by any way, and stay without triangles."""
+    _cut(shape, pieces, "")
+    faces = _faces(shape)
+    uncut = sum(_mesh(face) is None for face in faces)
+    if uncut < len(_uncut(shape)) or 2 * uncut >= len(faces):  # one beside the solids may be missing in one
+        raise why
+    return shape, pieces, [{**_surface(face), **_triangles(face)} for face in faces]
 
 
 def _no_body(data: bytes, faces: int = 0) -> str:
@@ -101,10 +114,16 @@ def _faces(shape: Any) -> list[Any]:
 def _divided(shape: Any, cut: Any, pieces: int, done: str) -> list[dict[str, Any]]:
     """The faces of a shape, in triangles of so many pieces a turn of what is ``cut``: it, or it as splines."""
     _cut(cut, pieces, done)
-    every = _parts([*_parts([cut], "TopAbs_SOLID", "Solid"), cut], "TopAbs_FACE", "Face")
-    if uncut := [face for face in every if _mesh(face) is None]:  # one beside the solids may be missing in one
-        raise Unusable(f"of faces that can be cut into triangles, got {_named(uncut)}{_hint(cut)}")
+    if uncut := _uncut(cut):
+        which = f"{len(uncut)} that cannot: {_named(uncut[0])}{_hint(cut)}"
+        raise Unusable(f"of faces that can be cut into triangles, got {which}")
     return [{**_surface(face), **_triangles(divided)} for face, divided in zip(_faces(shape), _faces(cut), strict=True)]
+
+
+def _uncut(shape: Any) -> list[Any]:
+    """Faces that have no triangles, of the solids and beside them."""
+    every = _parts([*_parts([shape], "TopAbs_SOLID", "Solid"), shape], "TopAbs_FACE", "Face")
+    return [face for face in every if _mesh(face) is None]
 
 
 def _said(reader: Any) -> Callable[[Any], dict[str, Any]]:
@@ -261,6 +280,8 @@ def _triangles(face: Any) -> dict[str, Any]:
 
     location = TopLoc_Location()
     mesh = _mesh(face, location)
+    if mesh is None:
+        return {"nodes": [], "triangles": []}
     turn = location.Transformation()
     nodes = [_vector(mesh.Node(i).Transformed(turn)) for i in range(1, mesh.NbNodes() + 1)]
     one, two = (2, 1) if face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else (1, 2)
@@ -277,10 +298,10 @@ def _mesh(face: Any, location: Any = None) -> Any:
     return BRep_Tool.Triangulation_s(face, TopLoc_Location() if location is None else location)
 
 
-def _named(faces: list[Any]) -> str:
-    """What faces are, the first of them by its surface and a point of its boundary."""
-    kind, edges = _surface(faces[0])["kind"], _parts(faces[:1], "TopAbs_EDGE", "Edge")
-    told = f"{len(faces)} that cannot: a {'surface' if kind == 'other' else kind}"
+def _named(face: Any) -> str:
+    """A face by its surface and a point of its boundary."""
+    kind, edges = _surface(face)["kind"], _parts([face], "TopAbs_EDGE", "Edge")
+    told = f"a {'surface' if kind == 'other' else kind}"
     if not edges:
         return told
     return told + " through ({:.6g}, {:.6g}, {:.6g}) mm".format(*_curve(edges[0])["ends"][0])

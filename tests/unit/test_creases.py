@@ -269,7 +269,7 @@ def test_boundaries_that_pass_through_one_vertex_are_two():
     assert points[16] == pytest.approx([0, 3])
     for order in (1, -1):
         ways = {here: onward[::order] for here, onward in after.items()}
-        found = sorted(rims._simple(ways), key=len)
+        found = sorted(rims.simple_loops(ways), key=len)
         assert [sorted(loop) for loop in found] == [[0, 1, 2, 3, 16], sorted(rows.tolist())]
 
 

@@ -47,7 +47,7 @@ def test_a_package_needs_no_extra(package):
     known = packages_distributions()
     for file in (ROOT / package).rglob("*.py"):
         for module in imported(file) - set(OURS) - CHECK - set(OPTIONAL) - sys.stdlib_module_names:
-            assert core & {dist.lower() for dist in known.get(module, ())}, f"{file} imports {module}"
+            assert core & {dist.lower() for dist in known.get(module, (module,))}, f"{file} imports {module}"
 
 
 def test_it_would_be_seen(tmp_path):

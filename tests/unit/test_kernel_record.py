@@ -241,6 +241,17 @@ def test_faces_that_cannot_be_cut_are_refused(kernel, monkeypatch):
         step_kernel.record(b"data", 20, 2000)
 
 
+def test_a_face_that_cannot_be_cut_stays_open_where_most_can(kernel, monkeypatch):
+    """It has no triangles, and is named; its surface and the others are as before."""
+    kernel.whole, kernel.mesh = body(*map(plain, "fgh")), triangles(2)
+    monkeypatch.setattr(step_kernel, "_mesh", lambda face, *_: None if face.name == "g" else kernel.mesh)
+    found = step_kernel.record(b"data", 20, 2000)
+    assert [len(face["triangles"]) for face in found["faces"]] == [2, 0, 2]
+    assert found["uncut"] == "1, a surface"
+    monkeypatch.setattr(step_kernel, "_mesh", lambda face, *_: kernel.mesh)
+    assert "uncut" not in step_kernel.record(b"data", 20, 2000)
+
+
 @pytest.mark.parametrize(
     ("faces", "most", "pieces"), [(2, 2000, 96), (2, 83, 81), (2, 25, 23), (2, 14, 12), (2, 3, 12), (3, 83, 40)]
 )

@@ -96,13 +96,6 @@ def test_a_file_that_is_cut_off_says_so(tmp_path, header):
         mesh.read(path)
 
 
-def test_open_mesh_is_refused(tmp_path):
-    shape = trimesh.creation.box((1, 1, 1))
-    shape.update_faces(np.arange(len(shape.faces)) > 0)
-    with pytest.raises(InvalidInput, match=r"object\.file must be a closed surface"):
-        mesh.solid(shape)
-
-
 def test_scene_names_the_key_of_a_bad_mesh(tmp_path):
     text = (scenes.load.__globals__["BUNDLED"] / "wedge.toml").read_text()
     path = tmp_path / "s.toml"

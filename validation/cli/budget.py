@@ -23,6 +23,7 @@ from validation.cli.common import (
     parse_poses,
     progress,
     say,
+    scene_of,
     taking,
 )
 from validation.cli.outputs import check_directory, check_file
@@ -84,7 +85,7 @@ def budget_command(given: Options) -> None:
     """The uncertainty of every measurand: each source, its share, and the expanded uncertainty."""
     _check(given)
     poses = None if given.sensor is None else parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
-    loaded = scenes.load(given.scene)
+    loaded = scene_of(given.scene)
     from imaging.light.appearance import is_plain
     from validation import boxes, budgets
 

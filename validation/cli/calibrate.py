@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-import scenes
-from validation.cli.common import Json, SceneName, Seed, check_number, check_seed, commands, progress, say
+from validation.cli.common import Json, SceneName, Seed, check_number, check_seed, commands, progress, say, scene_of
 from validation.cli.outputs import check_file
 from validation.defaults import DEFAULT_SEED
 from validation.report.terminal import console
@@ -29,7 +28,7 @@ def calibrate_command(
     check_number("--images", images, 10, _MOST_IMAGES)
     check_seed(seed)
     check_file("--output", output, ".png")
-    loaded = scenes.load(scene)
+    loaded = scene_of(scene)
     from measure.calibration import calibrate
     from validation.report import calibration_table
 

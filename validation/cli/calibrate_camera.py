@@ -9,10 +9,9 @@ from typing import Annotated
 
 import typer
 
-import scenes
 from scenes import InvalidInput
 from scenes.files.image import Size
-from validation.cli.common import Json, check_number, commands, first_picture, progress, say, taking
+from validation.cli.common import Json, check_number, commands, first_picture, progress, say, scene_of, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
@@ -104,7 +103,7 @@ def calibrate_camera_command(given: Options) -> None:
     if not splined:
         read_model(given.model)
     scene, beside = given.scene, given.output and _beside(given.output, splined)
-    camera = None if scene is None else scenes.load(scene).camera
+    camera = None if scene is None else scene_of(scene).camera
     with progress("corners") as shown:
         size = camera and Size(camera.height, camera.width, scene)
         seen = read_boards(given.boards, printed, given.noise, shown, size)
@@ -160,7 +159,7 @@ def _proposal(given: Options, found, seen):
         return None
     from validation.next_board import propose
 
-    picture = first_picture(scenes.load(given.scene), None, None)
+    picture = first_picture(scene_of(given.scene), None, None)
     return propose(found, seen.boards, given.square, picture, given.following)
 
 

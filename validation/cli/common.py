@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from scenes import InvalidInput, Picture, Pose, Scene
+from scenes import InvalidInput, Picture, Pose, Scene, load
 from validation.batch.stopped import CONTINUE, Interrupted, interruption
 from validation.cli import verbosity
 from validation.report.terminal import console
@@ -72,6 +72,14 @@ def taking(options: type[Given]) -> Callable[[Callable[[Given], None]], Callable
         return command
 
     return made
+
+
+def scene_of(name: str) -> Scene:
+    """A scene; on standard error what its part's file leaves open."""
+    scene = load(name)
+    if scene.solid.caps and not verbosity.quiet():
+        print(f"Warning: object.file has {scene.solid.mended[-1]}, and no plan looks at them", file=sys.stderr)
+    return scene
 
 
 def tolerance(bias_px: float | None, variance: float | None) -> EffectTolerance:

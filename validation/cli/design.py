@@ -15,7 +15,7 @@ import typer
 import scenes
 from scenes import catalogue
 from scenes.status import is_trusted
-from validation.cli.common import Json, SceneName, check_number, commands, progress, say, taking
+from validation.cli.common import Json, SceneName, check_number, commands, progress, say, scene_of, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -87,7 +87,7 @@ def design_command(given: Options) -> None:
     check_file("--picture", given.picture, ".png", ".svg")
     check_file("--write", given.write, ".toml")
     wishes = _wishes(given)
-    scene, parts = scenes.load(given.scene), catalogue.load(given.catalogue)
+    scene, parts = scene_of(given.scene), catalogue.load(given.catalogue)
     began, problem = time.perf_counter(), Problem.of(scene, wishes)
     with progress(f"{scene.name}: searching the catalogue", "so far", at_once=True) as shown, _mapped() as mapped:
         found = design(problem, parts, report=shown, mapped=mapped, own_light=given.own_light)

@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-import scenes
 from validation.cli.common import (
     Effects,
     Json,
@@ -16,6 +15,7 @@ from validation.cli.common import (
     commands,
     progress,
     say,
+    scene_of,
     tolerance,
 )
 from validation.report.terminal import console
@@ -35,7 +35,7 @@ def effects_command(
     as_json: Json = False,
 ) -> None:
     """Which effects a scene calls for, why, their influence and cost. Exit status 1 if --check contradicts."""
-    loaded = scenes.load(scene)
+    loaded = scene_of(scene)
     from render.phenomena import effects
     from validation.effects_check import check
     from validation.report import effects_table

@@ -10,7 +10,7 @@ import typer
 
 import scenes
 from validation.batch.stopped import Interrupted
-from validation.cli.common import Json, SceneName, check_number, commands
+from validation.cli.common import Json, SceneName, check_number, commands, scene_of
 from validation.strict_json import dumps
 
 commands = commands()
@@ -26,7 +26,7 @@ def explore_command(
 ) -> None:
     """Drag camera and lights around the object and see at once how well it can be measured; ends with Ctrl-C."""
     check_number("--port", port, 0, 65535)
-    loaded = scenes.load(scene)
+    loaded = scene_of(scene)
     _ = loaded.quantities  # or one line
     try:
         import aiohttp  # noqa: F401

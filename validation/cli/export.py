@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import scenes
-from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, progress, say
+from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, progress, say, scene_of
 from validation.cli.outputs import check_directory
 
 commands = commands()
@@ -33,7 +33,7 @@ def export_command(
     if estimator not in measure.ESTIMATORS:
         raise scenes.InvalidInput(f"--estimator must be one of {', '.join(measure.ESTIMATORS)}, got {estimator!r}")
     check_directory("--output", output)
-    picture = scenes.Picture.of(scenes.load(scene), parse_pose("--sensor", sensor), parse_poses("--light", light))
+    picture = scenes.Picture.of(scene_of(scene), parse_pose("--sensor", sensor), parse_poses("--light", light))
     from validation.recipe import export, folder
 
     export.check(picture, estimator)

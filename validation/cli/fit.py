@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-import scenes
 from scenes import InvalidInput
 from scenes.files.image import Size
 from scenes.photograph import read
 from validation.cli import photograph, recorded
-from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say, taking
+from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, say, scene_of, taking
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
@@ -59,7 +58,7 @@ def fit_command(given: Options) -> None:
         raise InvalidInput(f"PHOTO... must be at most {_MOST_PHOTOGRAPHS} files, got {len(given.photographs)}")
     check_file("--output", given.output, ".toml")
     check_file("--residuals", given.residuals, ".png")
-    loaded = scenes.load(given.scene)
+    loaded = scene_of(given.scene)
     size = Size.of_camera(loaded.camera)
     images = [read(path, given.gamma, given.channel, size=size) for path in given.photographs]
     import measure

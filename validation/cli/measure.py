@@ -16,7 +16,7 @@ from scenes.files.image import Size
 from scenes.photograph import Photograph
 from scenes.status import ILL_CONDITIONED, is_trusted, legend
 from validation.cli import measurands, photograph, placement, recorded, together
-from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say, taking
+from validation.cli.common import Json, commands, parse_pose, parse_poses, progress, say, scene_of, taking
 from validation.cli.outputs import check_directory, check_file
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -154,7 +154,7 @@ def _measure_scene(given: Options) -> NoReturn:
     poses = parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
     from validation import inspection, picture_file
 
-    known = scenes.load(given.scene)
+    known = scene_of(given.scene)
     files = [(given.file, *poses), *(_also(text) for text in given.also or [])]
     shown = [scenes.Picture.of(known, *where) for _, *where in files]
     for each in shown:

@@ -20,6 +20,7 @@ from validation.cli.common import (
     parse_poses,
     progress,
     say,
+    scene_of,
     taking,
 )
 from validation.report.terminal import console
@@ -74,7 +75,7 @@ def msa_command(given: Options) -> None:
 
     _check(given)
     poses = None if given.sensor is None else parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
-    picture = first_picture(scenes.load(given.scene), *poses)
+    picture = first_picture(scene_of(given.scene), *poses)
     with progress("simulating the picture for its bias", "renders", at_once=True):
         found = budgets.budget_of(picture)
     told = msa.predicted(found, placed_once=given.placed_once)

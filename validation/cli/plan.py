@@ -22,6 +22,7 @@ from validation.cli.common import (
     parse_poses,
     progress,
     say,
+    scene_of,
     taking,
 )
 from validation.cli.outputs import check_directory, check_file
@@ -206,7 +207,7 @@ def plan_command(given: Options) -> None:
     elif given.several:
         plan_views.check_options(given.context, given.views, given.views_share)
     target = _target(given) if given.write else None
-    scene = scenes.load(given.scene)
+    scene = scene_of(given.scene)
     how = {"step_deg": given.step, "constraints": given.constraints()} | poses
     if given.objective == "capability":
         check_left_out(given.context, "--objective capability", *_NOT_CAPABILITY)

@@ -11,7 +11,7 @@ import typer
 import scenes
 from scenes import InvalidInput, Pose, several
 from scenes.status import CLUTTER, is_trusted, legend, worst
-from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, progress, say
+from validation.cli.common import Json, SceneName, commands, parse_pose, parse_poses, progress, say, scene_of
 from validation.report.cells import PLACES
 from validation.report.terminal import console
 from validation.strict_json import plain
@@ -50,7 +50,7 @@ def predict_command(
     if render and model != "calibrated":
         raise InvalidInput(f"--render must be left out with --model {model}, got both")
     poses = None if sensor is None else parse_pose("--sensor", sensor), parse_poses("--light", light)
-    loaded = scenes.load(scene)
+    loaded = scene_of(scene)
     pictures = _pictures(loaded, *poses)
     import planner
 

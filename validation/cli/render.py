@@ -9,7 +9,6 @@ from typing import Annotated
 import numpy as np
 import typer
 
-import scenes
 from validation.cli.common import (
     Effects,
     Json,
@@ -23,6 +22,7 @@ from validation.cli.common import (
     parse_pose,
     parse_poses,
     say,
+    scene_of,
     taking,
     tolerance,
 )
@@ -53,7 +53,7 @@ def render_command(given: Options) -> None:
     poses = parse_pose("--sensor", given.sensor), parse_poses("--light", given.light)
     check_seed(given.noise_seed, "--noise-seed")
     check_file("--output", given.output, ".png", ".tif", ".tiff", ".npy")
-    loaded = scenes.load(given.scene)
+    loaded = scene_of(given.scene)
     import render
     from validation import picture_file
 

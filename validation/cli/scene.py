@@ -12,7 +12,7 @@ import scenes
 from scenes.results import picked
 from scenes.status import legend
 from scenes.view import units_meant
-from validation.cli.common import Json, SceneName, commands, parse_pose, progress, say
+from validation.cli.common import Json, SceneName, commands, parse_pose, progress, say, scene_of
 from validation.cli.outputs import check_file
 from validation.report.terminal import console
 
@@ -136,7 +136,7 @@ def show_command(scene: SceneName, sensor: Sensor = None, output: Picture = None
     """List the vertices, edges and circles that a task can name, and draw them."""
     check_file("--output", output, ".png")
     pose = sensor and parse_pose("--sensor", sensor)
-    loaded = scenes.load(scene)
+    loaded = scene_of(scene)
     from validation.report import scene_table
 
     pose = loaded.check_pose(
