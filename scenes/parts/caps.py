@@ -40,7 +40,8 @@ def caps(vertices: np.ndarray, halves: np.ndarray) -> list[np.ndarray]:
     found = []
     for loops, frame in _in_planes([np.array(loop) for loop in simple_loops(after) if len(loop) > 2], vertices):
         flat = [vertices[loop] @ frame.T for loop in loops]
-        found.append(np.concatenate(loops)[manifold3d.triangulate(flat)])
+        cap = np.concatenate(loops)[manifold3d.triangulate(flat)]
+        found.append(cap[(cap != np.roll(cap, 1, 1)).all(1)])  # loops may touch in a vertex
     return found
 
 
@@ -81,7 +82,7 @@ def unknown(chains: list[Chain], normals: np.ndarray, filled: np.ndarray) -> np.
     """Which of the faces that fill holes, bool (F,), are caps; not one between two that it bends to as facets do."""
     if not filled.any():
         return filled
-    faces = np.array([faces for _, faces, _ in chains if filled[list(faces)].sum() == 1])
+    faces = np.array([faces for _, faces, _ in chains if filled[list(faces)].sum() == 1], int).reshape(-1, 2)
     slight = (normals[faces[:, 0]] * normals[faces[:, 1]]).sum(1) >= _BENDS
     return filled & (np.bincount(faces[slight].ravel(), minlength=len(filled)) < 2)
 

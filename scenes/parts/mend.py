@@ -20,6 +20,7 @@ from scenes.parts.rows import different
 _GAP = 1e-5  # of the part's size: open edges that lie closer are one
 _SLIT = 3e-4  # of the part's size: what is open and narrower is filled
 _MOST_AROUND = 64  # corners of a slit
+_NO_AREA = 1e-14  # of the part's size, squared: a triangle of less has no plane
 _MOST_OPEN = 10_000  # edges: more are no seams between triangles that were meant to meet
 _SAME = 1e-5  # rad, between triangles of one plane
 _SAID = 3  # places of open edges
@@ -202,16 +203,15 @@ def _capped(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     left = _open(mesh.faces)
     if not len(left):
         return mesh, []
-    halves = _halves(mesh.faces)
-    _, which = different(np.sort(halves, 1))
-    alone = np.flatnonzero(np.bincount(which)[which] == 1)
-    added = caps(mesh.vertices, halves[alone][:, ::-1]) if len(left) <= _MOST_OPEN else []
-    new = np.concatenate([np.zeros((0, 3), int), *added])
-    beside = dict(zip(halves[alone, 1].tolist(), (alone % len(mesh.faces)).tolist(), strict=True))
-    rows = np.array([beside[corner] for corner in new[:, 0].tolist()], int)
-    found = _of(mesh, mesh.vertices, np.concatenate([mesh.faces, new]), np.append(np.arange(len(mesh.faces)), rows))
-    found.face_attributes["cap"][len(mesh.faces) :] = np.repeat(range(1, len(added) + 1), [len(cap) for cap in added])
-    if len(_open(found.faces)):
+    added = caps(mesh.vertices, left[:, ::-1]) if len(left) <= _MOST_OPEN else []
+    new, whole = np.concatenate([np.zeros((0, 3), int), *added]), np.arange(len(mesh.faces))
+    beside = np.zeros(len(mesh.vertices), int)
+    beside[mesh.faces] = whole[:, None]
+    rows = np.append(whole, beside[new[:, 0]])
+    found = _of(mesh, mesh.vertices, np.concatenate([mesh.faces, new]), rows)
+    found.face_attributes["cap"][len(whole) :] = np.repeat(range(1, len(added) + 1), [len(cap) for cap in added])
+    is_flat = (found.area_faces[len(whole) :] <= _NO_AREA * mesh.extents.max() ** 2).any()
+    if is_flat or len(_open(found.faces)):
         raise InvalidInput(f"object.file must be a closed surface, got open edges: {_places(mesh, left)}")
     return found, [f"holes closed: {len(added)}, of open edges: {_places(mesh, left)}"]
 
@@ -317,11 +317,12 @@ def _halves(faces: np.ndarray) -> np.ndarray:
 
 
 def _open(faces: np.ndarray) -> np.ndarray:
-    """Edges that triangles pass one way more often than the other, (n, 2)."""
+    """Edges that triangles pass one way more often than the other, that way, (n, 2)."""
     halves = _halves(faces)
     way = np.where(halves[:, 0] < halves[:, 1], 1, -1)
     edges, which = different(np.sort(halves, 1))
-    return edges[np.bincount(which, way) != 0]
+    balance = np.bincount(which, way)
+    return np.where(balance[:, None] > 0, edges, edges[:, ::-1])[balance != 0]
 
 
 def _places(mesh: trimesh.Trimesh, edges: np.ndarray) -> str:
