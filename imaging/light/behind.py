@@ -12,7 +12,7 @@ from imaging.light.appearance import analyser_axis, face_signal, signal, unit
 from imaging.light.backlight import backlights, backlit
 from imaging.light.between import light_between
 from imaging.pictures import Pictures
-from scenes import Floor, Material
+from scenes import Floor, Material, Solid
 from scenes.materials.vectors import chosen
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -73,17 +73,39 @@ def seen_by_rays(pictures: Pictures, origins: np.ndarray, vectors: np.ndarray) -
     return behind(pictures, start, np.ones(len(vectors), bool), ())
 
 
+def shadow_steps(pictures: Pictures, image: np.ndarray) -> np.ndarray:
+    """How direct light steps where a shadow's border lies between neighbours of image points (n, k, 2), ideal px from
+    the middle, of one picture: signal of the next less that of this one, shape (n, k - 1); 0 between other surfaces.
+    """
+    scene, bodies, pictures = pictures.scene, pictures.scene.bodies, pictures.glanced
+    start, vectors = (make(image, pictures.sensors, scene.camera) for make in (ray_origins, rays))
+    start = start + _NEAR * scene.solid.extent * unit(vectors)
+    face, t = first_face(bodies, start, vectors, ())
+    hit, met = start + np.where(face >= 0, t, 0.0)[..., None] * vectors, face >= 0
+    lit = np.array([_where(met, hit, face, each.at, partial(reaches, bodies)) for each in pictures.emitters])
+    if scene.bright_floor is not None:
+        place, ahead = _on_floor(scene.bright_floor, start, vectors, t)
+        on_floor = [_where(ahead, place, face, each.at, partial(_is_free, bodies)) for each in pictures.emitters]
+        face, lit = np.where(ahead, -2, face), np.where(ahead, on_floor, lit)
+    ends = (face[:, 1:] == face[:, :-1]) & (lit[..., 1:] != lit[..., :-1]).any(0)
+    if not ends.any():
+        return np.zeros(ends.shape)
+    signal = behind(pictures, start, np.ones(face.shape, bool), ())
+    return np.where(ends, np.diff(signal, axis=-1), 0.0)
+
+
 def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:
     """Signal of the floor at places (..., n, 3) upon it, in the bodies' shadows dark; 0 where not wanted."""
-    scene, bodies = pictures.scene, pictures.scene.bodies
-    lift = 1e-7 * bodies.extent * _UP
-
-    def free(points, _, light):
-        blocker, t = first_face(bodies, light, points + lift - light, ())
-        return (blocker < 0) | (t >= 1)
-
-    lit = tuple(_where(wanted, places, np.zeros(places.shape[:-1], int), e.at, free) for e in pictures.emitters)
+    scene, faces = pictures.scene, np.zeros(places.shape[:-1], int)
+    free = partial(_is_free, scene.bodies)
+    lit = tuple(_where(wanted, places, faces, each.at, free) for each in pictures.emitters)
     return signal(pictures, places, _UP, 1, lit, material=floor_material(scene.floor), fall_off=fall_off)
+
+
+def _is_free(bodies: Solid, points: np.ndarray, _: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Whether places (..., 3) of the floor see a position, bool (...)."""
+    blocker, t = first_face(bodies, light, points + 1e-7 * bodies.extent * _UP - light, ())
+    return (blocker < 0) | (t >= 1)
 
 
 @lru_cache(maxsize=64)

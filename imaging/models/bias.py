@@ -15,13 +15,14 @@ import numpy as np
 from imaging.blurred.boundaries import Boundaries, Places, boundaries_near
 from imaging.blurred.clipped_step import clipped
 from imaging.blurred.segment import Segments, second_and_third
+from imaging.blurred.shadows import with_shadows
 from imaging.features.demosaiced import line_shift
 from imaging.features.locator import CLEARANCE, edge_blur
 from imaging.features.measurand import Measurands, corner_response, measurands, normals
 from imaging.features.projected_edges import edge_ends
 from imaging.features.sampling import sampled_line
 from imaging.geometry.blur import blur_in_focus, confusion
-from imaging.geometry.lens import lens_jacobian
+from imaging.geometry.lens import image_centre, lens_jacobian
 from imaging.geometry.lens import recorded as recorded_at
 from imaging.geometry.projection import depth, edge_points
 from imaging.light.appearance import is_plain
@@ -233,6 +234,9 @@ def _crossings(pictures: Pictures, nodes: EdgeNodes, normal: np.ndarray) -> tupl
     width = np.hypot(blur, scale)
     widest = float(np.nanmax(width, initial=0.0))
     near = boundaries_near(pictures, _places(pictures, fractions, normal), _FAR * widest, CLEARANCE * widest)
+    if pictures.closely and not is_plain(scene):
+        image = view.ends[..., :1, :] + fractions[..., None] * view.along[..., None, :] - image_centre(scene.camera)
+        near = with_shadows(near, pictures, image, np.broadcast_to(normal[..., None, :], image.shape), _FAR * widest)
     contrast = np.zeros(width.size)
     levels = recorded(scene.noise, scene.noise.dark_level + near.sides[near.own]).level
     contrast[near.place[near.own]] = levels[:, 1] - levels[:, 0]

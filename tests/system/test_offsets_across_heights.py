@@ -92,14 +92,15 @@ def test_derivatives_are_differences(folder, sensor, light):
 
 
 @pytest.mark.parametrize(
-    ("sensor", "light", "focal", "length"),
-    [((28.0, 111.0), (28.0, 174.0), 1200.0, 33), ((31.0, 194.0), (41.0, 159.0), 600.0, 18)],
+    ("sensor", "light", "focal", "length", "first"),
+    [((28.0, 111.0), (28.0, 174.0), 1200.0, 33, "ok"), ((31.0, 194.0), (41.0, 159.0), 600.0, 18, "clutter")],
 )
-def test_scatter_is_as_predicted(folder, sensor, light, focal, length):
-    """Of 400 noisy pictures, of the two that are ok. A variance a third larger or smaller would be refused."""
+def test_scatter_is_as_predicted(folder, sensor, light, focal, length, first):
+    """Of 400 noisy pictures. A variance a third larger or smaller would be refused. The border of a shadow beside the
+    first one's edge, 2 px away in the second setting, biases it."""
     scene = stepped(folder, focal)
     told = planner.predict(scene, sensor, light)
-    assert [each.status for each in told.measurands] == ["ok", "ok", "clutter"]
+    assert [each.status for each in told.measurands] == [first, "ok", "clutter"]
     assert [edge.length_px for edge in told.edges[:2]] == pytest.approx([length, length], abs=1)
     clean = render.image(scene, sensor, light)
     noisy = render.expose(clean, scene.noise, np.random.default_rng(3), IMAGES)
