@@ -29,7 +29,7 @@ def floored():
 
 def test_where_a_shadow_ends_light_steps():
     """Across the border, from 2 px within the shadow to 2 px beyond: the one step is between the middle two."""
-    scene, pictures, corners, shadows, light = floored()
+    scene, pictures, _, shadows, light = floored()
     far = np.argsort(-np.linalg.norm(shadows[:, :2] - light[:2], axis=1))[:3]  # the farthest, and its neighbours
     away = np.array([-2, -1, -0.5, -0.1, 0.1, 0.5, 1, 2.0])
     for other in far[1:]:
