@@ -55,25 +55,31 @@ class Places:
         pixels = np.unique(near)
         return cls(pixels, np.searchsorted(pixels, near), weights, float(offsets[0]), gain, slope_to_contrast)
 
-    def profiles(self, used: np.ndarray) -> np.ndarray:
-        """The function at all places, (M, T), of the grey levels (P,) of `pixels`."""
-        return (self.weights @ used[self.near][:, :, None])[:, :, 0]
+    def profiles(self, levels: np.ndarray) -> np.ndarray:
+        """The function at all places, (T, M), of the grey levels (P,) of `pixels`."""
+        return np.einsum("mtw,mw->tm", self.weights, levels.take(self.near))
+
+    def part(self, some: slice) -> Places:
+        """Some of the places, of the same `pixels`."""
+        return Places(
+            self.pixels, self.near[some], self.weights[some], self.first, self.gain[some], self.slope_to_contrast[some]
+        )
 
     @property
     def gain_of_noise(self) -> np.ndarray:
         """Standard deviation of the function for that of a pixel, (M,)."""
         return np.sqrt((self._middle**2).sum(1))
 
-    def pixels_of(self, part: slice) -> np.ndarray:
-        """Which of `pixels` some places depend on, in order."""
-        return np.unique(self.near[part])
+    def used(self) -> np.ndarray:
+        """Which of `pixels` the places depend on, in order, (Q,)."""
+        return np.unique(self.near)
 
-    def responses(self, maps: np.ndarray, part: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Which of `pixels` some places depend on, (Q,), and the derivatives (k, Q) by these of sums ``maps`` (k, m) of
+    def responses(self, maps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which of `pixels` the places depend on, (Q,), and the derivatives (k, Q) by these of sums ``maps`` (k, M) of
         the offsets that unit contrast would show there."""
-        pixels = self.pixels_of(part)
-        place = np.searchsorted(pixels, self.near[part]).ravel()
-        unit = (self.slope_to_contrast[part] * self.gain[part])[:, None] * self._middle[part]
+        pixels = self.used()
+        place = np.searchsorted(pixels, self.near).ravel()
+        unit = (self.slope_to_contrast * self.gain)[:, None] * self._middle
         rows = [np.bincount(place, (row[:, None] * unit).ravel(), pixels.size) for row in maps]
         return pixels, np.array(rows)
 
