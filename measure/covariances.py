@@ -25,6 +25,8 @@ def _symmetric(product: np.ndarray) -> np.ndarray:
 
 def of_measured(covariance: np.ndarray, measured: np.ndarray) -> np.ndarray:
     """Covariances (..., M, M), infinite on the diagonal of what is not ``measured``, bool (..., M), NaN beside it."""
+    if measured.all():
+        return covariance.copy()
     both = measured[..., :, None] & measured[..., None, :]
     lost = np.where(np.eye(measured.shape[-1], dtype=bool), np.inf, np.nan)
     return np.where(both, covariance, lost)

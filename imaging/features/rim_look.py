@@ -175,7 +175,8 @@ def _levels(pictures: Pictures, circle: Circle, angle, places, normals, width) -
 
 
 def _on_lines(lines: np.ndarray, numbers: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Of cells (m, C) on lines, round a closed rim or held at an arc's ends, those of numbers (n, J, C) and the next."""
+    """Of cells (m, C) on lines, round a closed rim or held at an arc's ends, those of numbers (n, J, C) and of the next
+    ones."""
     count, cells = lines.shape
     lowest = numbers.min()
     every = np.arange(lowest, numbers.max() + 2)

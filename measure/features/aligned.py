@@ -31,7 +31,7 @@ class Aligned:
 
     def poses(self, images: np.ndarray) -> np.ndarray:
         """The best candidate in each of n images of P pixels, (n, P): shape (n, 3)."""
-        levels = images[:, self.pixels].mean(-1)
+        levels = images.take(self.pixels, 1).mean(-1)
         rise = np.abs(levels @ self.slope.T)
         best = [each.take(self._met).sum(0).argmax() for each in rise]
         return self.candidates[np.array(best, int)]

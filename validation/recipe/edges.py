@@ -23,7 +23,7 @@ from measure.features.lines import (
     trapezoid,
 )
 from scenes import status
-from validation.recipe.places import Places
+from validation.recipe.places import SideBySide
 from validation.recipe.sensor import Seen, Sensor
 
 _NO_PLACE = np.zeros((4, 1))  # of what is told of places: there is none
@@ -84,7 +84,8 @@ class Edges:
         Where the places of each begin among all.
     along : ndarray, shape (m,)
         Along its edge of each place, px.
-    places : Places
+    places : SideBySide
+        Of those that can be measured.
     sensor : Sensor
     limits : tuple of float
         Least contrast over noise, and how far off an edge is caught, px.
@@ -97,37 +98,37 @@ class Edges:
     shown: np.ndarray
     starts: np.ndarray
     along: np.ndarray
-    places: Places
+    places: SideBySide
     sensor: Sensor
     limits: tuple[float, float]
     aligned: Aligned | None
 
-    def find(self, seen: Seen, profiles: np.ndarray, image: np.ndarray) -> FoundEdges:
-        """In a picture (height, width), by what is seen of it and the profiles (T, m)."""
+    def find(self, seen: Seen, image: np.ndarray) -> FoundEdges:
+        """In a picture (height, width), by what is seen of it."""
         edges = len(self.fixed)
         lines, covariance = np.full((edges, 2), np.nan), np.zeros((edges, 2, edges, 2))
         found = np.full(edges, status.LOW_CONTRAST, object)
         if self.shown.size:
-            lines[self.shown], covariance[self.shown, :, self.shown], found[self.shown] = self._lines(seen, profiles)
+            lines[self.shown], covariance[self.shown, :, self.shown], found[self.shown] = self._lines(seen)
         covariance = covariance.reshape(2 * edges, 2 * edges)
         states = edge_states(self.fixed, found).tolist()
         return FoundEdges(lines, covariance, states, edges > 0 and self._are_elsewhere(lines, covariance, image))
 
-    def _lines(self, seen: Seen, profiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _lines(self, seen: Seen) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(level, slope) of the edges that can be measured, (S, 2), their covariances (S, 2, 2) and statuses (S,)."""
         padded, places = self._padded, self.places
-        signed, turned = self._turned(profiles)
+        signed, turned = self._turned(places.profiles(seen.levels))
         variances, moments = self._noise_in(seen)
         best = crossings.surest(signed[None])  # each place as an image by itself: sums then run along rows
         offset, valid, slope = crossings.located(places.first, best)
-        spread = self._gain_of_noise * np.sqrt(np.repeat(variances[0], self._sizes))
-        counts = crossings.counted(best, spread, len(profiles))
+        spread = places.gain_of_noise * np.sqrt(np.repeat(variances[0], places.sizes))
+        counts = crossings.counted(best, spread, len(signed))
         each = offset * places.gain, valid, places.slope_to_contrast * slope, counts
         offset, valid, contrast, counts = np.concatenate([np.concatenate(each), _NO_PLACE], 1).take(padded.numbers, 1)
         points = crossings.edge_points(padded.along, offset, valid > 0, contrast, padded.even, counts, turned)
         found = fit_lines(points, points.weights, padded.there)
         level, tilt, contrast = level_and_slope(points, found)
-        state = line_state(points, found, self._sizes, self.limits[0], variances[1])
+        state = line_state(points, found, places.sizes, self.limits[0], variances[1])
         inverse = inverse_contrast(contrast, padded.middles)
         return np.stack([level, tilt], -1), np.einsum("ej,ek,eajbk->eab", inverse, inverse, moments), state
 
@@ -136,7 +137,7 @@ class Edges:
         (up,) = crossings.rise(profiles[None])
         every, first, second = self._means.places @ up
         turned = crossings.are_opposite(first, second, self._means.steps @ np.abs(up[1:] - up[:-1]))
-        return profiles * np.repeat(np.where(every >= 0, 1.0, -1.0), self._sizes), turned
+        return profiles * np.repeat(np.where(every >= 0, 1.0, -1.0), self.places.sizes), turned
 
     def _noise_in(self, seen: Seen) -> tuple[np.ndarray, np.ndarray]:
         """Variances (2, S) of noise at each edge's mean level, and on the mean; products of what noise does to its
@@ -163,18 +164,13 @@ class Edges:
             return False
         return bool(self.aligned.poses(image.reshape(1, -1)).any())
 
-    @cached_property
-    def _sizes(self) -> np.ndarray:
-        """How many places each edge has, (S,)."""
-        return np.diff(self.starts)
-
     @property
     def _parts(self) -> list[slice]:
         return [slice(*pair) for pair in zip(self.starts.tolist(), self.starts[1:].tolist(), strict=False)]
 
     @cached_property
     def _padded(self) -> Padded:
-        there = np.arange(max(self._sizes, default=0)) < self._sizes[:, None]
+        there = np.arange(max(self.places.sizes, default=0)) < self.places.sizes[:, None]
         numbers, (along, even) = np.full(there.shape, self.along.size), np.zeros((2, *there.shape))
         numbers[there], along[there] = np.arange(self.along.size), self.along
         even[there] = np.concatenate([trapezoid(self.along[part]) for part in self._parts])
@@ -194,14 +190,12 @@ class Edges:
     @cached_property
     def _responses(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Of each edge its pixels among those that are read, and what they do to (level, slope), (6, Q)."""
-        each = zip(self._parts, self._padded.middles, strict=True)
-        maps = ((by_noise(self.along[part], trapezoid(self.along[part]), middle), part) for part, middle in each)
-        return [self.places.part(part).responses(some) for some, part in maps]
+        each = zip(self.places.each, self._parts, self._padded.middles, strict=True)
+        return [
+            places.responses(by_noise(self.along[part], trapezoid(self.along[part]), middle))
+            for places, part, middle in each
+        ]
 
     @cached_property
     def _products(self) -> np.ndarray:
         return np.array([rows @ rows.T for _, rows in self._responses]).reshape(-1, 2, 3, 2, 3)
-
-    @cached_property
-    def _gain_of_noise(self) -> np.ndarray:
-        return self.places.gain_of_noise

@@ -13,7 +13,7 @@ from measure.estimators import crossings
 from measure.features.points import EachPoint
 from measure.features.rim_fit import RimFit
 from scenes import status
-from validation.recipe.places import Places
+from validation.recipe.places import Places, SideBySide
 from validation.recipe.sensor import Seen, Sensor
 
 
@@ -88,7 +88,7 @@ class Rim:
 
     @cached_property
     def _pixels(self) -> np.ndarray:
-        return self.places.used()
+        return self.places.used
 
     @cached_property
     def _products(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -108,31 +108,33 @@ class Rims:
     Attributes
     ----------
     each : tuple of Rim
-    places : Places
-        Of all of them, one after another.
     """
 
     each: tuple[Rim, ...]
-    places: Places
 
-    def find(self, seen: Seen, profiles: np.ndarray) -> list[FoundRim]:
-        """In what is seen of a picture, by the profiles (T, M)."""
+    def find(self, seen: Seen) -> list[FoundRim]:
+        """In what is seen of a picture."""
         if not self.each:
             return []
+        profiles = self._places.profiles(seen.levels)
         points = self._points(profiles[None])  # each place as an image by itself: sums then run along rows
         return [rim.find(seen, EachPoint(*(values[:, part] for values in points))) for rim, part in self._parts()]
+
+    @cached_property
+    def _places(self) -> SideBySide:
+        return SideBySide(tuple(rim.places for rim in self.each))
 
     def _points(self, profiles: np.ndarray) -> EachPoint:
         """Points (1, M) of profiles (1, T, M)."""
         up, near = crossings.rise(profiles)[0], crossings.rise_near(profiles)[0]
         signs = np.concatenate([rim.sign(up[part], near[part]) for rim, part in self._parts()])
-        offset, valid, slope = crossings.located(self.places.first, crossings.bracket(profiles * signs))
-        return EachPoint(offset * self.places.gain, valid, self.places.slope_to_contrast * slope)
+        offset, valid, slope = crossings.located(self._places.first, crossings.bracket(profiles * signs))
+        return EachPoint(offset * self._places.gain, valid, self._places.slope_to_contrast * slope)
 
     def _parts(self) -> Iterator[tuple[Rim, slice]]:
         """Each with the numbers of its places."""
         start = 0
         for rim in self.each:
-            stop = start + len(rim.places.gain)
+            stop = start + rim.places.gain.size
             yield rim, slice(start, stop)
             start = stop

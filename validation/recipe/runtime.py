@@ -25,7 +25,7 @@ from measure.features.rim_fit import Curve, RimFit
 from measure.known_bias import Correction
 from scenes import status
 from validation.recipe.edges import Edges
-from validation.recipe.places import Places
+from validation.recipe.places import Places, SideBySide
 from validation.recipe.rims import Rim, RimOptics, Rims
 from validation.recipe.sensor import Sensor
 from validation.recipe.told import Characteristic, Coverage, known, with_budget
@@ -65,7 +65,8 @@ class Recipe:
     ----------
     facts : dict
         As `facts.json` has them.
-    places : Places
+    pixels : ndarray of int, shape (P,)
+        Flat indices of all pixels that are read.
     edges : Edges
     rims : Rims
     values : tuple of Value
@@ -77,7 +78,7 @@ class Recipe:
     """
 
     facts: Mapping[str, Any]
-    places: Places
+    pixels: np.ndarray
     edges: Edges
     rims: Rims
     values: tuple[Value, ...]
@@ -93,11 +94,13 @@ class Recipe:
         with np.load(folder / "arrays.npz", allow_pickle=False) as archive:
             arrays = dict(archive)
         sensor = Sensor(**{name: math.inf if value is None else value for name, value in facts["sensor"].items()})
-        shape, locator = tuple(facts["shape"]), tuple(facts["locator"])
-        columns = (arrays[f"places.{name}"] for name in ("at", "normals", "gain", "slope_to_contrast"))
-        places = Places.of(*columns, locator, shape)
+        pixels, places = _places(facts, arrays)
+        shown = arrays["edges.shown"].size
+        rims = (
+            _rim(k, *each, arrays, sensor) for k, each in enumerate(zip(facts["rims"], places[shown:], strict=True))
+        )
         return cls(
-            facts, places, _edges(facts, arrays, places, sensor), _rims(facts, arrays, places, sensor),
+            facts, pixels, _edges(facts, arrays, SideBySide(places[:shown]), sensor), Rims(tuple(rims)),
             _values(facts, folder), _characteristics(facts), Coverage(tuple(facts["factors"]), facts["normal"]),
             _correction(facts, arrays), sensor,
         )  # fmt: skip
@@ -127,10 +130,8 @@ class Recipe:
             return self._measured(image)
 
     def _measured(self, image: np.ndarray) -> dict[str, Any]:
-        seen = self.sensor.seen(image.take(self.places.pixels))
-        profiles = self.places.profiles(seen.levels)
-        count = len(self.edges.along)
-        edges, rims = self.edges.find(seen, profiles[:, :count], image), self.rims.find(seen, profiles[:, count:])
+        seen = self.sensor.seen(image.take(self.pixels))
+        edges, rims = self.edges.find(seen, image), self.rims.find(seen)
         states = [self._state(each, edges, rims) for each in self.values]
         numbers = np.concatenate([edges.lines.ravel(), *(rim.errors for rim in rims)])
         value, rows = self._evaluated(states, numbers)
@@ -246,24 +247,28 @@ def _after(told: Correction, states: list[str], of: np.ndarray, u_bias: np.ndarr
     return [DISPLACED if before == DISPLACED else after for before, after in zip(states, found, strict=True)]
 
 
-def _edges(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray], places: Places, sensor: Sensor) -> Edges:
+def _places(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarray, tuple[Places, ...]]:
+    """All pixels that are read, and the places of the edges and of the rims, among these."""
+    columns = [arrays[f"places.{name}"] for name in ("at", "normals", "gain", "slope_to_contrast")]
+    parts = (*pairwise(arrays["edges.starts"].tolist()), *(rim["part"] for rim in facts["rims"]))
+    each = (tuple(column[start:stop] for column in columns) for start, stop in parts)
+    found = [Places.of(*some, tuple(facts["locator"]), tuple(facts["shape"])) for some in each]
+    pixels = np.unique(np.concatenate([places.near.ravel() for places in found]))
+    return pixels, tuple(places.among(pixels) for places in found)
+
+
+def _edges(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray], places: SideBySide, sensor: Sensor) -> Edges:
     names = ("pixels", "slope", "candidates", "places")
     aligned = Aligned(*(arrays[f"aligned.{name}"] for name in names)) if "aligned.pixels" in arrays else None
-    own = [arrays[f"edges.{name}"] for name in ("fixed", "lengths", "shown", "starts", "along")]
-    return Edges(*own, places.part(slice(own[-1].size)), sensor, tuple(facts["limits"]), aligned)
+    own = (arrays[f"edges.{name}"] for name in ("fixed", "lengths", "shown", "starts", "along"))
+    return Edges(*own, places, sensor, tuple(facts["limits"]), aligned)
 
 
-def _rims(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray], places: Places, sensor: Sensor) -> Rims:
-    """Their places come after the edges'."""
-    each = tuple(_rim(k, one, arrays, places, sensor) for k, one in enumerate(facts["rims"]))
-    return Rims(each, places.part(slice(len(arrays["edges.along"]), None)))
-
-
-def _rim(k: int, one: Mapping[str, Any], arrays: Mapping[str, np.ndarray], places: Places, sensor: Sensor) -> Rim:
+def _rim(k: int, one: Mapping[str, Any], places: Places, arrays: Mapping[str, np.ndarray], sensor: Sensor) -> Rim:
     def array(name: str) -> np.ndarray | None:
         return arrays.get(f"rims.{k}.{name}")
 
-    places, blur = places.part(slice(*one["part"])), array("blur")
+    blur = array("blur")
     optics = RimOptics(sensor.noise_variance, one["scale_px"], one["blur_px"] if blur is None else blur)
     along = array("along")
     curve = along if along is None else Curve(array("places"), array("normals"), places.gain, along, array("bend"))
