@@ -140,14 +140,18 @@ class Correction:
         Textures scatter by what `measure.unevenness` tells, and where it does, count in `u_bias` alone.
         """
         told = self.u_bias if u_bias is None else u_bias
-        texture = np.nan_to_num(self.sources[TEXTURE], posinf=0.0) if TEXTURE in self.sources else 0.0
         with np.errstate(invalid="ignore"):  # infinite stays so
-            left = np.where(of & np.isfinite(told), np.sqrt(np.maximum(told**2 - texture**2, 0.0)), np.inf)
-        told = zip(found, self.simulated, left, self.sigma, self.quantities, strict=True)
+            left = np.where(of & np.isfinite(told), np.sqrt(np.maximum(told**2 - self._texture**2, 0.0)), np.inf)
+        each = zip(found, self.simulated, left.tolist(), self.sigma.tolist(), self.quantities, strict=True)
         return [
-            status_corrected(str(state), simulated, float(u), float(sigma), _half(quantity))
-            for state, simulated, u, sigma, quantity in told
+            status_corrected(str(state), simulated, u, sigma, _half(quantity))
+            for state, simulated, u, sigma, quantity in each
         ]
+
+    @cached_property
+    def _texture(self) -> np.ndarray | float:
+        """What of the standard uncertainties is textures', (M,); 0 where that is not known."""
+        return np.nan_to_num(self.sources[TEXTURE], posinf=0.0) if TEXTURE in self.sources else 0.0
 
 
 def _together(sources: Mapping[str, np.ndarray], bias: np.ndarray) -> np.ndarray:

@@ -200,11 +200,13 @@ def _lacking(pull: np.ndarray, arc: np.ndarray) -> np.ndarray:
     scales.
     """
     steps = np.roll(pull, -1, -2) - pull
-    onward = steps / 2
+    onward, count = steps / 2, steps.shape[-2]
+    around = np.concatenate([steps, steps], -2)
     nearest = max(float(np.nanmin(arc, initial=_FAR)), 1e-300)
-    for k in range(1, min(int(_FAR / nearest), steps.shape[-2] // 2) + 1):
+    for k in range(1, min(int(_FAR / nearest), count // 2) + 1):
         half = k * arc / 2
-        onward += (np.exp(-(half**2)) - np.sqrt(np.pi) * half * erfc(half))[..., None] * np.roll(steps, -k, -2)
+        share = np.exp(-(half**2)) - np.sqrt(np.pi) * half * erfc(half)
+        onward += share[..., None] * around[..., k : k + count, :]
     found = np.swapaxes(steps, -1, -2) @ onward
     return found + np.swapaxes(found, -1, -2)
 

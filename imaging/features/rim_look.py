@@ -168,12 +168,21 @@ def _levels(pictures: Pictures, circle: Circle, angle, places, normals, width) -
     spread = 1 + _bend(pictures, circle, angle)[:, None] * width[:, None] * _MIDDLES  # of lines, away from the rim
     beside = (width[:, None] * _BESIDE)[..., None] / np.maximum(spread, _SPREAD)[:, None]
     at = _between(rim[0], here, normals, beside, circle.ends is None)
-    first, cell = np.floor(np.nan_to_num(at)).astype(int), np.arange(_MIDDLES.size)
-    share, then = at - first, first + 1
-    if circle.ends is not None:
-        first, then = (np.clip(each, 0, len(lines) - 1) for each in (first, then))
-    left, right = lines[first % len(lines), cell], lines[then % len(lines), cell]
+    before = np.floor(np.nan_to_num(at))
+    left, right = _on_lines(lines, before.astype(int), circle.ends is None)
+    share = at - before
     return np.where(share == 0, left, (1 - share) * left + share * right)
+
+
+def _on_lines(lines: np.ndarray, numbers: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Of cells (m, C) on lines, round a closed rim or held at an arc's ends, those of numbers (n, J, C) and of the next
+    ones."""
+    count, cells = lines.shape
+    lowest = numbers.min()
+    every = np.arange(lowest, numbers.max() + 2)
+    around = lines.take(every % count if closed else np.clip(every, 0, count - 1), 0).ravel()
+    flat = (numbers - lowest) * cells + np.arange(cells)
+    return around.take(flat), around.take(flat + cells)
 
 
 def _bend(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:
@@ -230,7 +239,7 @@ def _along_normals(pictures: Pictures, places: np.ndarray, normals: np.ndarray, 
     def seen(line: np.ndarray, cells: np.ndarray) -> np.ndarray:
         points = places[line] + (width[line] * cells)[:, None] * normals[line]
         levels = _looked_at(pictures, points)
-        return np.where(np.isfinite(points).all(-1), levels, np.nan)
+        return np.where(np.isfinite(points[:, 0] + points[:, 1]), levels, np.nan)
 
     line, cell = np.indices((len(places), _MIDDLES.size)).reshape(2, -1)
     levels = seen(line, _MIDDLES[cell]).reshape(len(places), -1)
@@ -289,10 +298,7 @@ def _second(steps: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.nd
     Of a step that lies w + e away, w of its outline and e of its cell's end, a Gaussian at a is exp(-(w - a)^2 / 2)
     exp(e a) times what `_steps` holds already, so that few exponentials tell it at many places.
     """
-    near = np.exp(_ENDS[:, None] * at[:, None])  # (n, ends, k)
-    plain, once, twice = np.split(
-        steps @ np.concatenate([near, *(_ENDS[:, None] ** p * near for p in (1, 2))], -1), 3, -1
-    )
+    plain, once, twice = _moments(steps, at, 3)
     away = where[..., None] - at[:, None]  # (n, J, k)
     bell = np.exp(-(away**2) / 2)
     value = bell * (once + away * plain)
@@ -300,10 +306,24 @@ def _second(steps: np.ndarray, where: np.ndarray, at: np.ndarray) -> tuple[np.nd
     return value.sum(1), slope.sum(1)
 
 
+def _second_alone(steps: np.ndarray, where: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The former of `_second`."""
+    plain, once = _moments(steps, at, 2)
+    away = where[..., None] - at[:, None]
+    return (np.exp(-(away**2) / 2) * (once + away * plain)).sum(1)
+
+
+def _moments(steps: np.ndarray, at: np.ndarray, count: int) -> list[np.ndarray]:
+    """Sums over the ends e of steps times exp(e a) times 1, e, e^2 ..., (n, J, k) each."""
+    near = np.exp(_ENDS[:, None] * at[:, None])  # (n, ends, k)
+    powers = [near, *(_ENDS[:, None] ** p * near for p in range(1, count))]
+    return np.split(steps @ np.concatenate(powers, -1), count, -1)
+
+
 def _rival(steps, where, crossing: np.ndarray, slope: np.ndarray, window: np.ndarray) -> np.ndarray:
     """How steep another crossing in the search window (n,), which noise may let win, is at most, over the slope."""
     places = np.linspace(-1, 1, _LOOKED)
-    told = _second(steps, where, places * window[:, None])[0] * np.sign(slope)[:, None]
+    told = _second_alone(steps, where, places * window[:, None]) * np.sign(slope)[:, None]
     left, right = told[:, :-1], told[:, 1:]
     size = window * (places[1] - places[0])
     fall = np.where((left >= 0) & (right < 0), (left - right) / size[:, None], 0.0)

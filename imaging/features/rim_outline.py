@@ -75,11 +75,13 @@ def _crossed(ends: np.ndarray, places: np.ndarray, normals: np.ndarray, beside: 
     along = np.einsum("mpei,mi->mpe", away, np.stack([-normals[:, 1], normals[:, 0]], -1))
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = (across[..., 1] - across[..., 0]) / (along[..., 1] - along[..., 0])
-    away = beside[:, None, :] - along[..., :1]  # (m, p, J)
-    hit = (away < 0) != (beside[:, None, :] - along[..., 1:] < 0)
-    place = np.where(hit, across[..., :1] + rate[..., None] * away, np.inf)
-    nearest = np.take_along_axis(place, np.abs(place).argmin(1)[:, None], 1)[:, 0]
-    return np.where(np.isfinite(nearest), nearest, np.nan)
+    hit = (beside[:, None] < along[..., :1]) != (beside[:, None] < along[..., 1:])  # (m, p, J), few of them
+    line, piece, which = (each.ravel() for each in np.nonzero(hit))
+    place = across[line, piece, 0] + rate[line, piece] * (beside[line, which] - along[line, piece, 0])
+    order = np.argsort(np.abs(place), kind="stable")[::-1]
+    found = np.full(beside.shape, np.nan)
+    found[line[order], which[order]] = place[order]  # the nearest last
+    return found
 
 
 def smooth_outline(

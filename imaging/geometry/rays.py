@@ -101,6 +101,8 @@ def _by_trial_of_each(
 
 def _in_parts(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own) -> tuple[np.ndarray, np.ndarray]:
     """`by_embree` of so few rays at a time that what is made of them stays near to the processor."""
+    if len(origins) <= _AT_ONCE:
+        return by_embree(plates, origins, vectors, own)
     face, t = np.empty(len(origins), int), np.empty(len(origins))
     for at in range(0, len(origins), _AT_ONCE):
         part = slice(at, at + _AT_ONCE)
@@ -123,18 +125,20 @@ def by_embree(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own
     for _ in range(_MOST_PASSED):
         if not rays.size:
             break
-        begin, way = origins.take(rays, 0), vectors.take(rays, 0)
-        ways = way / lengths[rays, None]
-        starts = (begin + at[rays, None] * way - plates.centre) / plates.radius
+        begin, way, size = (_some(each, rays) for each in (origins, vectors, lengths))
+        ways = way / size[:, None]
+        starts = (begin + _some(at, rays)[:, None] * way - plates.centre) / plates.radius
         found = plates.tree.run(starts.astype(np.float32), ways.astype(np.float32), query="INTERSECT", output=1)
         met = np.flatnonzero(found["primID"] >= 0)
-        rays, begin, way = rays[met], begin.take(met, 0), way.take(met, 0)
-        which, away = found["primID"][met], found["tfar"][met]
-        step[rays] = np.where(which == last[rays], 2 * step[rays], _PAST * plates.radius)
-        last[rays] = which
-        at[rays] += (away.astype(float) * plates.radius + step[rays]) / lengths[rays]
+        each = (rays, begin, way, size, found["primID"], found["tfar"])
+        rays, begin, way, size, which, away = (_some(values, met) for values in each)
         outside, place = plates.met(which, begin, way)
         outside &= ~_among(plates.faces[which], _of_rays(own, rays))
+        ahead = np.arange(len(rays)) if plates.margin else np.flatnonzero(~outside)  # what is followed on, or may be
+        some, passed = rays[ahead], which[ahead]
+        step[some] = np.where(passed == last[some], 2 * step[some], _PAST * plates.radius)
+        last[some] = passed
+        at[some] += (away[ahead].astype(float) * plates.radius + step[some]) / size[ahead]
         if plates.margin:
             near = np.flatnonzero(~plates.well_within(which, begin + place[:, None] * way))
             some = rays[near]
@@ -146,6 +150,11 @@ def by_embree(plates: Plates, origins: np.ndarray, vectors: np.ndarray, own: Own
         face[rays[outside]], t[rays[outside]] = plates.faces[which[outside]], place[outside]
         rays = rays[~outside]
     return face, t
+
+
+def _some(values: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Those of different numbers in order; the values themselves where these are all."""
+    return values if len(which) == len(values) else values.take(which, 0)
 
 
 def _of_rays(own: Own, rays: np.ndarray | slice) -> Own:

@@ -82,7 +82,7 @@ class CrossingLocator:
         profiles = self._profiles_of(used)
         turned = crossings.is_reversed(profiles)
         profiles *= crossings.polarity(profiles)
-        return self._points(profiles, crossings.surest(profiles), turned, self._spread(used))
+        return self._points(crossings.surest(profiles), turned, self._spread(used))
 
     def locate_each(self, images: np.ndarray) -> EachPoint:
         """Edge points of images (n, height, width), each position by itself: its contrast may be of either sign."""
@@ -92,7 +92,7 @@ class CrossingLocator:
         """The same of images of which only the locator's `pixels` are given, (n, P)."""
         profiles = self._profiles_of(np.ascontiguousarray(used.T))
         profiles *= crossings.known_signs(profiles, self.signs)[:, None]
-        offset, valid, slope = self._offsets(*crossings.bracket(profiles), profiles)
+        offset, valid, slope = self._offsets(crossings.bracket(profiles))
         return EachPoint(offset.T * self.gain, valid.T, (self.slope_to_contrast[:, None] * slope).T)
 
     def respond_each(self, clean: np.ndarray) -> tuple[EachPoint, sparse.csr_array]:
@@ -100,16 +100,16 @@ class CrossingLocator:
         profiles = self._profiles(clean[None])
         sign = crossings.known_signs(profiles, self.signs)
         profiles *= sign[:, None]
-        values = self._by_places(profiles, crossings.bracket(profiles), sign[:, 0])
+        values = self._by_places(crossings.bracket(profiles), sign[:, 0])
         return self.locate_each(clean[None]), self._of_places(values, clean.size)
 
-    def _offsets(self, crossing, start, found, profiles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _offsets(self, best: Crossings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Offsets, px, whether they are valid, and the slopes there, all (m, n)."""
-        return crossings.located(self.offsets[0], crossing, start, found, profiles)
+        return crossings.located(self.offsets[0], best)
 
-    def _points(self, profiles: np.ndarray, best: Crossings, turned: np.ndarray, spread: np.ndarray) -> EdgePoints:
-        offset, valid, slope = self._offsets(*best[:3], profiles)
-        along = np.broadcast_to(self.positions, (profiles.shape[2], self.positions.size))
+    def _points(self, best: Crossings, turned: np.ndarray, spread: np.ndarray) -> EdgePoints:
+        offset, valid, slope = self._offsets(best)
+        along = np.broadcast_to(self.positions, offset.T.shape)
         counts = crossings.counted(best, spread, self.offsets.size).T
         contrast = self.slope_to_contrast * slope.T
         return crossings.edge_points(
@@ -136,8 +136,8 @@ class CrossingLocator:
         turned, polarity = crossings.is_reversed(profiles), crossings.polarity(profiles)
         profiles *= polarity
         spread, best = self._spread(used), crossings.surest(profiles)
-        found = self._points(profiles, best, turned, spread)
-        values = self._by_places(profiles, best, np.full(len(profiles), polarity[0]))
+        found = self._points(best, turned, spread)
+        values = self._by_places(best, np.full(len(profiles), polarity[0]))
         if DECIDED <= found.certain[0] < 1:
             values += self._by_weights(found, profiles, spread, float(polarity[0]))
         return found, self._of_places(values, clean.size)
@@ -162,13 +162,12 @@ class CrossingLocator:
         near = sparse.coo_array(pick @ self.kernel + sparse.diags_array(values.sum(1)) @ self._common)
         return sparse.csr_array((near.data, (near.row, self.pixels[near.col])), (len(values), size))
 
-    def _by_places(self, profiles: np.ndarray, bracket: tuple[np.ndarray, ...], polarity: np.ndarray) -> np.ndarray:
-        """d(offset) / d(function) of one image whose profiles (m, T, 1) were made positive by signs (m,), (m, T)."""
-        crossing, start = bracket[:2]
-        root, slope = crossings.refine(profiles, crossing, start)
-        values = np.zeros(profiles.shape[:2])
-        values[np.arange(len(values))[:, None], crossing[:, :1] + np.arange(-1, 3)] = (
-            -STEP / slope[:, :1] * (polarity * self.gain)[:, None] * crossings.cubic_weights(root - crossing)[:, 0]
+    def _by_places(self, best: Crossings, polarity: np.ndarray) -> np.ndarray:
+        """d(offset) / d(function) of one image whose profiles were made positive by signs (m,), (m, T)."""
+        root, slope = crossings.refine(best)
+        values = np.zeros((len(root), self.offsets.size))
+        values[np.arange(len(values))[:, None], best.crossing[:, :1] + np.arange(-1, 3)] = (
+            -STEP / slope[:, :1] * (polarity * self.gain)[:, None] * crossings.cubic_weights(root - best.crossing)[:, 0]
         )
         return values
 

@@ -27,23 +27,25 @@ def known_signs(profiles: np.ndarray, known: np.ndarray | None) -> np.ndarray:
     Signs (m,) that are known stand in an image unless all of it brightens the other way, between the ends and close to
     the middle: light from elsewhere than the scene says turns all of them round.
     """
-    up = rise(profiles)
+    return signs(known, rise(profiles), rise_near(profiles))
+
+
+def signs(known: np.ndarray | None, up: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """The same by `rise` and `rise_near`, (m, n)."""
     if known is None:
         return np.where(up >= 0, 1.0, -1.0)
-    known, near = known[:, None], max(profiles.shape[1] // 2 - _NEAR, 0)
-    other = ((known * up).sum(0) < 0) & ((known * rise(profiles[:, near : profiles.shape[1] - near])).sum(0) < 0)
+    known = known[:, None]
+    other = ((known * up).sum(0) < 0) & ((known * near).sum(0) < 0)
     return known * np.where(other, -1.0, 1.0)
 
 
-def located(
-    first: float, crossing: np.ndarray, start: np.ndarray, found: np.ndarray, profiles: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Offsets, px, whether they are valid, and the slopes there, all (m, n), of what `bracket` says.
+def located(first: float, best: Crossings) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Offsets, px, whether they are valid, and the slopes there, all (m, n).
 
     ``first`` is the first place across the edge, px.
     """
-    offset, slope = refine(profiles, crossing, start)
-    valid = found & (np.abs(offset - start) < 1)
+    offset, slope = refine(best)
+    valid = best.found & (np.abs(offset - best.start) < 1)
     return np.where(valid, first + STEP * offset, 0.0), valid, np.where(valid, -slope / STEP, 0.0)
 
 
@@ -73,6 +75,12 @@ def rise(profiles: np.ndarray) -> np.ndarray:
     return profiles[:, :half].sum(1) - profiles[:, half + 1 :].sum(1)
 
 
+def rise_near(profiles: np.ndarray) -> np.ndarray:
+    """The same close to the middle, (m, n)."""
+    out = max(profiles.shape[1] // 2 - _NEAR, 0)
+    return rise(profiles[:, out : profiles.shape[1] - out])
+
+
 def is_reversed(profiles: np.ndarray) -> np.ndarray:
     """Whether the two halves of the edge brighten in opposite directions, each as clearly as the other, (n,)."""
     up = rise(profiles)
@@ -86,48 +94,76 @@ def are_opposite(first: np.ndarray, second: np.ndarray, noise: np.ndarray) -> np
 
 
 def _falls(signed: np.ndarray) -> np.ndarray:
-    """How much the function falls from each place to the next where it crosses zero there, else 0; (m, T - 3, n)."""
-    left, right = signed[:, 1:-2], signed[:, 2:-1]
-    return (left - right) * ((left >= 0) & (right < 0))
-
-
-def bracket(signed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Steepest descent through zero: left index, first estimate (in steps) and whether there is one; shape (m, n)."""
-    fall = _falls(signed)
-    return _started(signed, fall, fall.argmax(1))
-
-
-def _started(signed: np.ndarray, fall: np.ndarray, best: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What `bracket` says of a choice (m, n) among the places that have a fall."""
-    (here,), (drop,) = _taken(signed, best, (1,)), _taken(fall, best, (0,))
-    found = drop > 0
-    return best + 1, best + 1 + np.where(found, here / np.where(found, drop, 1), 0), found
-
-
-def _taken(values: np.ndarray, place: np.ndarray, beside: tuple[int, ...]) -> np.ndarray:
-    """Of values (m, T, n) those at places (m, n) and beside, (k, m, n); as `numpy.take_along_axis`, which is slower."""
-    m, _, n = values.shape
-    return values[np.arange(m)[:, None], place + np.array(beside)[:, None, None], np.arange(n)]
+    """Whether the function falls through zero from each place to the next, (m, T - 3, n)."""
+    below = signed[:, 1:-1] < 0
+    return below[:, 1:] > below[:, :-1]
 
 
 class Crossings(NamedTuple):
-    """What `bracket` says, and how far each is from being another one, in the function's unit; all (m, n)."""
+    """One crossing at each position of each image.
+
+    Attributes
+    ----------
+    crossing : ndarray of int, shape (m, n)
+        The last place before it.
+    start : ndarray, shape (m, n)
+        A first estimate of where it is, in steps.
+    found : ndarray of bool, shape (m, n)
+        Whether there is one.
+    around : ndarray, shape (4, m, n)
+        The function at the place before the last, the last, the next and the one after it.
+    apart : ndarray, shape (m, n)
+        How far it is from being another crossing, in the function's unit; infinite where that is not asked.
+    """
 
     crossing: np.ndarray
     start: np.ndarray
     found: np.ndarray
-    apart: np.ndarray
+    around: np.ndarray
+    apart: np.ndarray | float = np.inf
+
+
+def bracket(signed: np.ndarray) -> Crossings:
+    """Steepest descent through zero."""
+    best, several = _first(signed)
+    if several.any():
+        rows = np.moveaxis(signed, 1, -1)[several]
+        best[several] = ((rows[:, 1:-2] - rows[:, 2:-1]) * _falls(rows)).argmax(1)
+    return _started(signed, best)
 
 
 def surest(signed: np.ndarray) -> Crossings:
     """The steepest descent through zero, and how far noise would have to move the function for another one."""
-    fall = _falls(signed)
-    best, ahead = fall.argmax(1), np.full(fall[:, 0].shape, np.inf)
-    several = (fall > 0).sum(1) > 1
-    if several.any():
-        best[several], ahead[several] = _first_of_several(np.moveaxis(signed, 1, -1)[several])
-    crossing, start, found = _started(signed, fall, best)
-    return Crossings(crossing, start, found, np.minimum(ahead, _clear(signed, crossing)))
+    best, several = _first(signed)
+    if not several.any():
+        found = _started(signed, best)
+        return found._replace(apart=_clear(found.around))
+    best[several], ahead = _first_of_several(np.moveaxis(signed, 1, -1)[several])
+    found = _started(signed, best)
+    apart = _clear(found.around)
+    apart[several] = np.minimum(apart[several], ahead)
+    return found._replace(apart=apart)
+
+
+def _first(signed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The first fall among the places that may have one, and whether there are several; both (m, n)."""
+    falls = _falls(signed)
+    return falls.argmax(1), falls.view(np.uint8).sum(1, dtype=np.uint8) > 1
+
+
+def _started(signed: np.ndarray, best: np.ndarray) -> Crossings:
+    """What is said of a choice (m, n) among the places that may have a fall."""
+    crossing, around = best + 1, _around(signed, best)
+    _, here, after, _ = around
+    found = (here >= 0) & (after < 0)
+    return Crossings(crossing, crossing + np.where(found, here / np.where(found, here - after, 1), 0), found, around)
+
+
+def _around(values: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Of values (m, T, n) four from the first (m, n) on, (4, m, n); as `numpy.take_along_axis`, which is slower."""
+    _, size, n = values.shape
+    flat = np.arange(0, values.size, size * n)[:, None] + np.arange(n) + n * first
+    return values.reshape(-1).take(flat + np.arange(0, 4 * n, n)[:, None, None])
 
 
 def counted(found: Crossings, spread: np.ndarray, size: int) -> np.ndarray:
@@ -164,37 +200,44 @@ def _first_of_several(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Slopes are central differences, interpolated to the crossing: they change little where noise moves it over a place.
     Towards the window's ends they count the less, so that one that comes into it takes over smoothly.
     """
-    left, fall = rows[:, 1:-2], _falls(rows)
-    part = np.where(fall > 0, left / np.where(fall > 0, fall, 1.0), 0.0)
+    left, falls = rows[:, 1:-2], _falls(rows)
+    part = np.where(falls, left / np.where(falls, left - rows[:, 2:-1], 1.0), 0.0)
     slope = (rows[:, :-2] - rows[:, 2:]) / 2
     place = np.arange(left.shape[1]) + part
     steep = ((1 - part) * slope[:, :-1] + part * slope[:, 1:]) * _inside(place, left.shape[1])
-    steep = np.where(fall > 0, steep, -np.inf)
+    steep = np.where(falls, steep, -np.inf)
     best = np.partition(steep, -2, 1)[:, -2:]
     return steep.argmax(1), best[:, 1] - best[:, 0]
 
 
-def _clear(signed: np.ndarray, crossing: np.ndarray) -> np.ndarray:
-    """How far from zero the function is within a px beside the crossing, on the side where it is less, (m, n).
+def _clear(around: np.ndarray) -> np.ndarray:
+    """How far from zero the function is within a px beside a crossing, on the side where it is less, (m, n).
 
     Where it hardly leaves zero, another crossing is about to take this one away, or did so.
     """
-    before, here, after, beyond = _taken(signed, crossing, (-1, 0, 1, 2))
+    before, here, after, beyond = around
     return np.maximum(np.minimum(np.maximum(before, here), -np.minimum(after, beyond)), 0.0)
 
 
-def refine(signed: np.ndarray, crossing: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def refine(best: Crossings) -> tuple[np.ndarray, np.ndarray]:
     """Root (in steps) of the cubic through the four values around the crossing, and its slope there; shape (m, n)."""
-    values = _taken(signed, crossing, (-1, 0, 1, 2))
-    c0 = values[1]
-    c1 = -values[0] / 3 - values[1] / 2 + values[2] - values[3] / 6
-    c2 = (values[0] + values[2]) / 2 - values[1]
-    c3 = (values[3] - values[0]) / 6 + (values[1] - values[2]) / 2
-    x = start - crossing
+    before, c0, after, beyond = best.around
+    c1 = -before / 3 - c0 / 2 + after - beyond / 6
+    c2 = (before + after) / 2 - c0
+    c3 = (beyond - before) / 6 + (c0 - after) / 2
+    x = best.start - best.crossing
     for _ in range(3):
-        slope = c1 + x * (2 * c2 + 3 * x * c3)
-        x = x - (c0 + x * (c1 + x * (c2 + x * c3))) / np.where(slope < 0, slope, -np.inf)
-    return crossing + x, c1 + x * (2 * c2 + 3 * x * c3)
+        value, slope = _cubic(x, c0, c1, c2, c3)
+        x = x - value / np.where(slope < 0, slope, -np.inf)
+    return best.crossing + x, _cubic(x, c0, c1, c2, c3)[1]
+
+
+def _cubic(x: np.ndarray, *c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """c0 + c1 x + c2 x^2 + c3 x^3 and its slope, by Horner's rule."""
+    third = c[3] * x
+    second = c[2] + third
+    first = c[1] + second * x
+    return c[0] + first * x, first + (second + third) * x
 
 
 def cubic_weights(x: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,9 +31,12 @@ class Aligned:
 
     def poses(self, images: np.ndarray) -> np.ndarray:
         """The best candidate in each of n images of P pixels, (n, P): shape (n, 3)."""
-        levels = images[:, self.pixels].mean(-1)
+        levels = images.take(self.pixels, 1).mean(-1)
         rise = np.abs(levels @ self.slope.T)
-        score = np.zeros((len(self.candidates), len(images)))
-        for piece, place in zip(np.moveaxis(rise, 0, -1), self.places.T, strict=True):
-            score += piece[place]
-        return self.candidates[score.argmax(0)]
+        best = [each.take(self._met).sum(0).argmax() for each in rise]
+        return self.candidates[np.array(best, int)]
+
+    @cached_property
+    def _met(self) -> np.ndarray:
+        """Numbers of the places of all pieces at which each candidate then is, (P, C)."""
+        return self.places.T + np.arange(len(self.pixels))[:, None] * len(self.slope)

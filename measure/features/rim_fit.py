@@ -25,7 +25,7 @@ _PASSES = 3  # what is beside the first order is hundredths of a px, and changes
 _EXPECTED = 0.5  # of the share of its expected contrast that a place in the middle shows
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
 _MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
-_SMOOTH = 5  # places over which a contrast is averaged before an error is told from it
+_WINDOW = np.ones(5)  # places over which a contrast is averaged before an error is told from it
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class RimFit:
         errors = self.solve(fit, points.offset)
         near = ~self.is_far(errors)[:, None]
         used = np.where(near, self.as_expected(points.valid, points.contrast), points.valid)
-        if (used != points.valid).any():
+        if not np.array_equal(used, points.valid):
             fit = self.fit(used)
             errors = self.solve(fit, points.offset)
         return fit, errors, used
@@ -114,9 +114,8 @@ class RimFit:
 
     def states(self, points: EachPoint, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Statuses (n,), and whether so many points are found that the circle must be where they say, or near it."""
-        taken = self.weights > 0
         clear = points.contrast > MIN_CONTRAST / 2 * np.sqrt(self.optics.noise_variance)
-        part = (points.valid & clear)[:, taken].sum(1) / max(taken.sum(), 1)
+        part = np.count_nonzero(points.valid & clear & self._taken, 1) / max(np.count_nonzero(self._taken), 1)
         determined = np.isfinite(errors).all(1)
         state = np.where(part >= _MIN_FOUND, self.state, status.LOW_CONTRAST)
         return np.where(determined, state, status.ILL_CONDITIONED), determined & (part >= _MIN_NEAR)
@@ -124,9 +123,8 @@ class RimFit:
     def noise_rows(self, fit: np.ndarray, points: EachPoint) -> np.ndarray:
         """Derivatives (n, p, m) of the errors by what noise moves each place by at unit contrast."""
         contrast = np.where(points.valid, points.contrast, 0.0)
-        number = np.convolve(np.ones(contrast.shape[1]), np.ones(_SMOOTH), "same")
-        smooth = np.stack([np.convolve(row, np.ones(_SMOOTH), "same") for row in contrast]) / number
-        inverse = np.where(self.weights > 0, 1 / np.maximum(smooth, 1e-300), 0.0)
+        smooth = np.array([np.convolve(row, _WINDOW, "same") for row in contrast]) / self._smoothed
+        inverse = np.where(self._taken, 1 / np.maximum(smooth, 1e-300), 0.0)
         return _known(fit * inverse[:, None])
 
     def as_expected(self, valid: np.ndarray, contrast: np.ndarray) -> np.ndarray:
@@ -138,11 +136,9 @@ class RimFit:
         """
         if self.contrast is None:
             return valid
-        taken = valid & (self.weights > 0)
-        share = np.where(taken, contrast / np.where(self.contrast > 0, self.contrast, np.inf), np.nan)
-        some = taken.any(1)
-        middle = np.full(len(valid), np.nan)
-        middle[some] = [np.median(row[each]) for row, each in zip(share[some], taken[some], strict=True)]
+        taken = valid & self._taken
+        share = np.where(taken, contrast / self._told, np.nan)
+        middle = np.array([_median(row[each]) for row, each in zip(share, taken, strict=True)])
         return valid & ~(share < _EXPECTED * middle[:, None])
 
     def solve(self, fit: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -150,9 +146,10 @@ class RimFit:
 
         What moves the crossings of a circle beside the first order is told where it is found.
         """
-        found = np.einsum("nim,nm->ni", fit, offset + self.inward)
+        from_inside = offset + self.inward
+        found = (fit @ from_inside[:, :, None])[:, :, 0]
         for _ in range(_PASSES if self.curve else 0):
-            found = np.einsum("nim,nm->ni", fit, offset + self.inward - self.beside(found))
+            found = (fit @ (from_inside - self.beside(found))[:, :, None])[:, :, 0]
         return found
 
     def beside(self, found: np.ndarray) -> np.ndarray:
@@ -160,9 +157,11 @@ class RimFit:
         if self.curve is None:
             return np.zeros((len(found), len(self.design)))
         near = _known(found)
-        near = np.where(np.abs(near @ self.design.T).max(-1, keepdims=True) <= _NEAR, near, 0.0)
+        moved = near @ self.design.T
+        far = np.abs(moved).max(-1) > _NEAR
+        near[far], moved[far] = 0.0, 0.0
         second = self.curve.second_order(near)
-        return second + self.curve.sampled(near @ self.design.T + second, self.optics, self._amplitude)
+        return second + self.curve.sampled(moved + second, self.optics, self._amplitude)
 
     @cached_property
     def _amplitude(self) -> np.ndarray:
@@ -171,25 +170,40 @@ class RimFit:
 
     def fit(self, valid: np.ndarray) -> np.ndarray:
         """Least-squares maps (n, p, m) from offsets at the valid places (n, m) to the parameters."""
-        if valid.all():
-            return np.broadcast_to(self._of_all, (len(valid), *self._of_all.shape))
-        return self._fit(valid)
+        if not valid.all():
+            return self._fit(valid)
+        return self._of_all if len(valid) == 1 else np.broadcast_to(self._of_all, (len(valid), *self._of_all.shape[1:]))
 
     @cached_property
     def _of_all(self) -> np.ndarray:
-        return self._fit(np.ones((1, len(self.weights)), bool))[0]
+        return self._fit(np.ones((1, len(self.weights)), bool))
+
+    @cached_property
+    def _taken(self) -> np.ndarray:
+        """Which places are taken, bool (m,)."""
+        return self.weights > 0
+
+    @cached_property
+    def _told(self) -> np.ndarray:
+        """The contrast that is expected, infinite where none is, (m,)."""
+        return np.where(self.contrast > 0, self.contrast, np.inf)
+
+    @cached_property
+    def _smoothed(self) -> np.ndarray:
+        """Over how many places the contrast at each is averaged, (m,)."""
+        return np.convolve(np.ones(len(self.weights)), _WINDOW, "same")
 
     def _fit(self, valid: np.ndarray) -> np.ndarray:
-        weights = self.weights * valid
-        gram = np.einsum("nm,mi,mj->nij", weights, self.design, self.design)
+        weighted = self.design.T * (self.weights * valid)[:, None]
+        gram = weighted @ self.design
         scale = np.sqrt(np.einsum("nii->ni", gram))
         good = (scale > 0).all(-1)
         scale[~good], gram[~good] = 1.0, np.eye(self.design.shape[1])
-        unit = gram / (scale[:, :, None] * scale[:, None, :])
+        scales = scale[:, :, None] * scale[:, None, :]
+        unit = gram / scales
         good &= np.linalg.eigvalsh(unit)[:, 0] > 1e-8
         unit[~good] = np.eye(self.design.shape[1])
-        found = np.linalg.inv(unit) / (scale[:, :, None] * scale[:, None, :])
-        found = np.einsum("nij,mj,nm->nim", found, self.design, weights)
+        found = np.linalg.inv(unit) / scales @ weighted
         found[~good] = np.nan
         return found
 
@@ -197,3 +211,9 @@ class RimFit:
 def _known(values: np.ndarray) -> np.ndarray:
     """0 where there is no number."""
     return np.where(np.isfinite(values), values, 0.0)
+
+
+def _median(values: np.ndarray) -> float:
+    """Of some numbers (k,), NaN of none; as `numpy.median`, which takes several times as long for a few hundred."""
+    ordered = np.sort(values)
+    return (ordered[(len(values) - 1) // 2] + ordered[len(values) // 2]) / 2 if len(values) else np.nan

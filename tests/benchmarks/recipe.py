@@ -40,7 +40,7 @@ def measured(folder: Path) -> str:
     )
     names = len(recipe.values)
     return (
-        f"{folder.name}: {names} values, {len(recipe.places.pixels)} pixels, prepared in {prepared:.1f} s; a picture: "
+        f"{folder.name}: {names} values, {len(recipe.pixels)} pixels, prepared in {prepared:.1f} s; a picture: "
         f"{wall[0]:.2f} ms at least, {wall[1]:.2f} ms median; of the processor {own[0]:.2f}, {own[1]:.2f} ms"
     )
 

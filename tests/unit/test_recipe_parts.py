@@ -7,9 +7,12 @@ import pytest
 from scipy.special import stdtrit
 
 from imaging.sensor import recorded
+from measure.estimators.windows import places_across, second_derivatives
 from planner.uncertainty.budget import coverage_factor
 from scenes import InvalidInput, Noise
 from validation.recipe import code
+from validation.recipe import places as places_of
+from validation.recipe.places import Places, SideBySide
 from validation.recipe.sensor import Sensor
 from validation.recipe.told import Characteristic, Coverage, with_budget
 from validation.recipe.traced import Tape, numbers
@@ -105,3 +108,31 @@ def test_a_recipe_s_modules_need_numpy_alone(monkeypatch):
     monkeypatch.setattr(code, "FRONT", "measure.estimators.crossing")  # negative control: it takes SciPy
     with pytest.raises(InvalidInput, match=r"must need NumPy alone, got (scipy|pydantic|cv2|skimage)"):
         code.sources()
+
+
+def _around(angles):
+    """Places on a circle in a picture of 60 x 80 pixels, and their normals."""
+    normals = np.stack([np.cos(angles), np.sin(angles)], -1)
+    return np.array([41.3, 28.7]) + 12.4 * normals, normals
+
+
+@pytest.mark.parametrize("large", [0, 1 << 30], ids=["two bands", "one"])
+def test_places_tell_the_locator_s_function(monkeypatch, large):
+    """Of a noisy picture at all places, in bands or whole, by the windows themselves."""
+    monkeypatch.setattr(places_of, "_LARGE", large)
+    image, scale, window = np.random.default_rng(4).uniform(0, 200, (60, 80)), 1.2, 3.0
+    parts = [_around(np.linspace(first, first + 2.0, 9)) for first in (0.2, 3.0)]
+    each = [Places.of(*part, np.ones(9), np.ones(9), (scale, window), image.shape) for part in parts]
+    pixels = np.unique(np.concatenate([places.near.ravel() for places in each]))
+    side = SideBySide(tuple(places.among(pixels) for places in each))
+    assert [len(places.bands) for places in side.each] == [2 if large == 0 else 1] * 2
+
+    at, normals = (np.concatenate(some) for some in zip(*parts, strict=True))
+    offsets, across, toward = places_across(at, normals, window)
+    values, first = second_derivatives(across, toward, scale)
+    size = values.shape[1]
+    windows = np.array([image[y : y + size, x : x + size] for x, y in first])
+    expected = (values * windows).sum((1, 2)).reshape(len(at), offsets.size)
+    np.testing.assert_allclose(side.profiles(image.ravel()[pixels]).T, expected, rtol=0, atol=1e-11)
+    middle = values.reshape(len(at), offsets.size, -1)[:, offsets.size // 2]
+    np.testing.assert_allclose(side.gain_of_noise, np.linalg.norm(middle, axis=-1), rtol=1e-13)

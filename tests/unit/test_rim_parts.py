@@ -12,7 +12,7 @@ from imaging.features import limb_look, rim_look, rim_sides
 from imaging.features.rim_look import RimLook
 from imaging.features.rim_outline import _crossed, zero_of_steps
 from imaging.pictures import Pictures
-from measure.features.rim_fit import RimFit
+from measure.features.rim_fit import RimFit, _median
 from scenes import Circle
 from scenes.viewpoint import Viewpoint
 
@@ -33,6 +33,25 @@ def test_second_derivative_of_steps_between_cells(rng):
         bell = steps[row] * np.exp(-(away**2) / 2)
         assert value[row, k] == pytest.approx((bell * away).sum(), rel=1e-10)
         assert slope[row, k] == pytest.approx((bell * (away**2 - 1)).sum(), rel=1e-10)
+    alone = rim_look._second_alone(rim_look._steps(levels, where), where, at)
+    assert alone == pytest.approx(value, rel=1e-10, abs=1e-8)
+
+
+def test_lines_beside_each_other_round_a_rim_and_at_an_arc_s_ends(rng):
+    """Those of numbers below the first and beyond the last go on round a closed rim, and stay at an arc's ends."""
+    lines, numbers = rng.uniform(0, 1, (5, 3)), rng.integers(-4, 8, (6, 2, 3))
+    for closed, kept in ((True, numbers % 5), (False, np.clip(numbers, 0, 4))):
+        onward = (numbers + 1) % 5 if closed else np.clip(numbers + 1, 0, 4)
+        found = rim_look._on_lines(lines, numbers, closed)
+        np.testing.assert_array_equal(found[0], lines[kept, np.arange(3)])
+        np.testing.assert_array_equal(found[1], lines[onward, np.arange(3)])
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 30])
+def test_the_middle_of_some_numbers_is_their_median(rng, count):
+    values = rng.normal(size=count)
+    assert _median(values) == np.median(values)
+    assert np.isnan(_median(values[:0]))
 
 
 def test_zero_of_steps(rng):

@@ -81,10 +81,7 @@ def test_a_line_s_errors_are_linear_where_another_edge_crosses(share, angle, whe
 def plainly_found(monkeypatch) -> None:
     """Every point counts as a whole, the steepest descent from one place to the next is taken."""
 
-    def steepest(signed):
-        return crossings.Crossings(*crossings.bracket(signed), np.full(signed[:, 0].shape, np.inf))
-
-    monkeypatch.setattr(crossings, "surest", steepest)
+    monkeypatch.setattr(crossings, "surest", crossings.bracket)
     monkeypatch.setattr(crossings, "counted", lambda found, spread, size: np.ones(found.start.shape))
 
 

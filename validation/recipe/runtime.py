@@ -9,7 +9,9 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,8 +25,8 @@ from measure.features.rim_fit import Curve, RimFit
 from measure.known_bias import Correction
 from scenes import status
 from validation.recipe.edges import Edges
-from validation.recipe.places import Places
-from validation.recipe.rims import Rim, RimOptics
+from validation.recipe.places import Places, SideBySide
+from validation.recipe.rims import Rim, RimOptics, Rims
 from validation.recipe.sensor import Sensor
 from validation.recipe.told import Characteristic, Coverage, known, with_budget
 
@@ -46,13 +48,13 @@ class Value:
         Which it needs.
     formula : callable
         Gives of all numbers the value, its derivatives by ``slopes``, and sines of the angles at which edges cross.
-    slopes : tuple of int
+    slopes : ndarray of int
     """
 
     edges: tuple[int, ...]
     rims: tuple[int, ...]
     formula: Formula
-    slopes: tuple[int, ...]
+    slopes: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +65,10 @@ class Recipe:
     ----------
     facts : dict
         As `facts.json` has them.
-    places : Places
+    pixels : ndarray of int, shape (P,)
+        Flat indices of all pixels that are read.
     edges : Edges
-    rims : tuple of Rim
+    rims : Rims
     values : tuple of Value
     characteristics : tuple of Characteristic
     coverage : Coverage
@@ -75,9 +78,9 @@ class Recipe:
     """
 
     facts: Mapping[str, Any]
-    places: Places
+    pixels: np.ndarray
     edges: Edges
-    rims: tuple[Rim, ...]
+    rims: Rims
     values: tuple[Value, ...]
     characteristics: tuple[Characteristic, ...]
     coverage: Coverage
@@ -91,12 +94,13 @@ class Recipe:
         with np.load(folder / "arrays.npz", allow_pickle=False) as archive:
             arrays = dict(archive)
         sensor = Sensor(**{name: math.inf if value is None else value for name, value in facts["sensor"].items()})
-        shape, locator = tuple(facts["shape"]), tuple(facts["locator"])
-        columns = (arrays[f"places.{name}"] for name in ("at", "normals", "gain", "slope_to_contrast"))
-        places = Places.of(*columns, locator, shape)
+        pixels, places = _places(facts, arrays)
+        shown = arrays["edges.shown"].size
+        rims = (
+            _rim(k, *each, arrays, sensor) for k, each in enumerate(zip(facts["rims"], places[shown:], strict=True))
+        )
         return cls(
-            facts, places, _edges(facts, arrays, places, sensor),
-            tuple(_rim(k, one, arrays, places, sensor) for k, one in enumerate(facts["rims"])),
+            facts, pixels, _edges(facts, arrays, SideBySide(places[:shown]), sensor), Rims(tuple(rims)),
             _values(facts, folder), _characteristics(facts), Coverage(tuple(facts["factors"]), facts["normal"]),
             _correction(facts, arrays), sensor,
         )  # fmt: skip
@@ -126,17 +130,15 @@ class Recipe:
             return self._measured(image)
 
     def _measured(self, image: np.ndarray) -> dict[str, Any]:
-        used = image.reshape(-1)[self.places.pixels].astype(float)
-        profiles = self.places.profiles(used)
-        edges = self.edges.find(used, profiles[: len(self.edges.along)], image)
-        rims = [rim.find(used, profiles) for rim in self.rims]
+        seen = self.sensor.seen(image.take(self.pixels))
+        edges, rims = self.edges.find(seen, image), self.rims.find(seen)
         states = [self._state(each, edges, rims) for each in self.values]
         numbers = np.concatenate([edges.lines.ravel(), *(rim.errors for rim in rims)])
         value, rows = self._evaluated(states, numbers)
-        errors = _joined(edges.covariance, [rim.covariance for rim in rims])
+        errors = self._joined(edges.covariance, [rim.covariance for rim in rims])
         measured = _are(states, status.MEASURED)
         covariance = of_measured(spread(rows[None], errors[None]), measured[None])[0]
-        return self._told(value, covariance, states, image, self.sensor.saturated(used))
+        return self._told(value, covariance, states, image, seen.saturated)
 
     def _checked(self, image: Any) -> np.ndarray:
         array, shape = np.asarray(image), tuple(self.facts["shape"])
@@ -158,6 +160,21 @@ class Recipe:
         if (value.edges and edges.displaced) or any(rims[c].displaced for c in value.rims):
             return DISPLACED
         return status.worst(*(edges.states[e] for e in value.edges), *(rims[c].state for c in value.rims))
+
+    def _joined(self, lines: np.ndarray, rims: list[np.ndarray]) -> np.ndarray:
+        """Covariance of lines and circles, which count as independent."""
+        parts = self._numbers
+        whole = np.zeros((parts[-1].stop, parts[-1].stop))
+        for part, block in zip(parts, [lines, *rims], strict=True):
+            whole[part, part] = block
+        return whole
+
+    @cached_property
+    def _numbers(self) -> list[slice]:
+        """Which numbers are the lines' and each circle's."""
+        counts = [2 * len(self.edges.fixed), *(rim.fit.design.shape[1] for rim in self.rims.each)]
+        ends = np.cumsum([0, *counts]).tolist()
+        return [slice(*pair) for pair in pairwise(ends)]
 
     def _evaluated(self, states: list[str], numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Values (M,), NaN where there is none, and their derivatives (M, q); ``states`` change where edges that cross
@@ -198,7 +215,7 @@ class Recipe:
         doubts = [None] * len(value) if u_bias is None else u_bias.tolist()
         each = zip(value.tolist(), sigma.tolist(), zip(off.tolist(), doubts, strict=True), there, states, strict=True)
         rows = [_row(one, self.coverage, *own) for one, own in zip(self.characteristics, each, strict=True)]
-        return {"measurands": rows, "covariance": [[known(each) for each in row] for row in covariance]}
+        return {"measurands": rows, "covariance": [[known(each) for each in row] for row in covariance.tolist()]}
 
 
 def _row(
@@ -230,36 +247,33 @@ def _after(told: Correction, states: list[str], of: np.ndarray, u_bias: np.ndarr
     return [DISPLACED if before == DISPLACED else after for before, after in zip(states, found, strict=True)]
 
 
-def _joined(lines: np.ndarray, rims: list[np.ndarray]) -> np.ndarray:
-    """Covariance of lines and circles, which count as independent."""
-    blocks = [lines, *rims]
-    ends = np.cumsum([0, *(len(block) for block in blocks)])
-    whole = np.zeros((ends[-1], ends[-1]))
-    for start, stop, block in zip(ends, ends[1:], blocks, strict=False):
-        whole[start:stop, start:stop] = block
-    return whole
+def _places(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> tuple[np.ndarray, tuple[Places, ...]]:
+    """All pixels that are read, and the places of the edges and of the rims, among these."""
+    columns = [arrays[f"places.{name}"] for name in ("at", "normals", "gain", "slope_to_contrast")]
+    parts = (*pairwise(arrays["edges.starts"].tolist()), *(rim["part"] for rim in facts["rims"]))
+    each = (tuple(column[start:stop] for column in columns) for start, stop in parts)
+    found = [Places.of(*some, tuple(facts["locator"]), tuple(facts["shape"])) for some in each]
+    pixels = np.unique(np.concatenate([places.near.ravel() for places in found]))
+    return pixels, tuple(places.among(pixels) for places in found)
 
 
-def _edges(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray], places: Places, sensor: Sensor) -> Edges:
+def _edges(facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray], places: SideBySide, sensor: Sensor) -> Edges:
     names = ("pixels", "slope", "candidates", "places")
     aligned = Aligned(*(arrays[f"aligned.{name}"] for name in names)) if "aligned.pixels" in arrays else None
     own = (arrays[f"edges.{name}"] for name in ("fixed", "lengths", "shown", "starts", "along"))
     return Edges(*own, places, sensor, tuple(facts["limits"]), aligned)
 
 
-def _rim(k: int, one: Mapping[str, Any], arrays: Mapping[str, np.ndarray], places: Places, sensor: Sensor) -> Rim:
+def _rim(k: int, one: Mapping[str, Any], places: Places, arrays: Mapping[str, np.ndarray], sensor: Sensor) -> Rim:
     def array(name: str) -> np.ndarray | None:
         return arrays.get(f"rims.{k}.{name}")
 
-    part = slice(*one["part"])
     blur = array("blur")
     optics = RimOptics(sensor.noise_variance, one["scale_px"], one["blur_px"] if blur is None else blur)
     along = array("along")
-    curve = (
-        along if along is None else Curve(array("places"), array("normals"), places.gain[part], along, array("bend"))
-    )
+    curve = along if along is None else Curve(array("places"), array("normals"), places.gain, along, array("bend"))
     numbers = (array(name) for name in ("design", "weights", "inward"))
-    return Rim(RimFit(*numbers, one["state"], optics, curve, array("contrast")), places, part, array("signs"), sensor)
+    return Rim(RimFit(*numbers, one["state"], optics, curve, array("contrast")), places, array("signs"), sensor)
 
 
 def _values(facts: Mapping[str, Any], folder: Path) -> tuple[Value, ...]:
@@ -268,7 +282,7 @@ def _values(facts: Mapping[str, Any], folder: Path) -> tuple[Value, ...]:
     spec.loader.exec_module(formulas)
     each = zip(facts["values"], formulas.FORMULAS, strict=True)
     return tuple(
-        Value(tuple(of["edges"]), tuple(of["rims"]), formula, tuple(of["slopes"])) for of, formula in each
+        Value(tuple(of["edges"]), tuple(of["rims"]), formula, np.array(of["slopes"], int)) for of, formula in each
     )  # fmt: skip
 
 

@@ -47,8 +47,8 @@ def _crossings():
     places, normals = rng.uniform(6, 14, (3, 2)), np.array([[1.0, 0], [0.6, 0.8], [-0.8, 0.6]])
     return {
         "polarity": crossings.polarity(rows), "rise": crossings.rise(rows), "reversed": crossings.is_reversed(rows),
-        "bracket": tuple(each[:, 0] for each in best),
-        "refined": tuple(each[:, 0] for each in crossings.refine(one, best[0], np.zeros((4, 1)))),
+        "bracket": tuple(each[:, 0] for each in best[:3]),
+        "refined": tuple(each[:, 0] for each in crossings.refine(best._replace(start=np.zeros((4, 1))))),
         "weights": crossings.cubic_weights(np.array([0.1, 0.5, 0.83])),
         "across": windows.places_across(places, normals, 1.7),
         "rows": crossing.gaussian_rows(places, 1.3, (20, 22)).toarray(),
