@@ -35,7 +35,7 @@ from scenes.measurands.form import forms_of
 from scenes.measurands.kinds import MEASURANDS
 
 _ROWS = 256  # sensors at a time
-_WAYS = 16  # of things past an edge's face that are told apart
+_WAYS = 16  # of what is past an edge's face that are told apart; all others are one
 _MARGIN = 1e-5  # relative; single precision in sums of some 20 terms of one sign
 
 
@@ -183,9 +183,10 @@ def _behind(
     there = np.zeros((len(rows), len(bodies.faces) + 2), bool)
     np.put_along_axis(there, things, True, 1)  # nothing is the last
     kinds, which, count = np.unique(there[:, :-1], axis=0, return_inverse=True, return_counts=True)
-    rare = np.argsort(np.argsort(-count)) >= _WAYS
-    kinds[rare] = kinds.any(0)
-    return [Look(side, tuple(np.flatnonzero(kind).tolist())) for kind in kinds], which.ravel()
+    order = np.argsort(-count, kind="stable")
+    which, kinds = np.minimum(np.argsort(order)[which.ravel()], _WAYS), kinds[order]
+    kinds = [*kinds[:_WAYS], *([kinds[_WAYS:].any(0)] if len(kinds) > _WAYS else [])]
+    return [Look(side, tuple(np.flatnonzero(kind).tolist())) for kind in kinds], which
 
 
 def _of_line(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
