@@ -3,7 +3,7 @@
 On a plane matt face the signal at p is K / |l - p|^3, K the light's height over the face times its reflectance and
 power, so along a piece of an edge it is largest at the nearest place and smallest at the farthest. What lies behind an
 edge, where one of its faces is turned away, is no brighter than such a face or the floor is anywhere under that light,
-and in a shadow it is dark.
+nor darker than it is anywhere if all of it is lit (`lit`); else it may be dark.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from imaging.models.strong import ROUGH
 from imaging.pictures import Pictures
 from imaging.sensor import headroom, shot_noise
 from planner.search.grid import by_light
+from planner.search.lit import all_lit
 from scenes import Edge, Noise, Scene, Solid
 
 PIECES = 16  # of an edge, each with a bound of its own
@@ -37,7 +38,7 @@ class Look(NamedTuple):
     side : int or None
         Which of the edge's faces is seen alone; None where both are.
     behind : tuple of int
-        What may be seen past the other one (`things_behind`).
+        What may be seen past the other one (`things_behind`); -1 for darkness.
     """
 
     side: int | None = None
@@ -67,11 +68,14 @@ def brightest(scene: Scene, looks: dict[str, list[Look]], lights: np.ndarray) ->
     pictures = Pictures.of(scene, np.zeros(2), by_light(lights) if lights.shape[1] else ()).glanced
     standing = [np.broadcast_to(at, (len(lights), 3)) for at in pictures.lights_at]
     shining = [_Shining(np.broadcast_to(each.at, (len(lights), 3)), each.power) for each in pictures.emitters]
-    most = sum(_most(scene, each) for each in shining)
+    things = {thing for ways in looks.values() for look in ways for thing in look.behind}
+    shown = [_Shown.of(scene, each, things) for each in shining]
+    fewest = shown[0].least if len(scene.lights) == 1 else np.zeros_like(shown[0].least)
+    beyond = _Shown(sum(each.most for each in shown), fewest)
     edges = [(scene.solid.edge(name), ways) for name, ways in looks.items()]
     shadows = [_shadows(scene.bodies, edge, standing) for edge, _ in edges]
     return [
-        _of_edge(scene, ways, _Sides.of(scene, edge, shining), most, *dark)
+        _of_edge(scene, ways, _Sides.of(scene, edge, shining), beyond, *dark)
         for (edge, ways), dark in zip(edges, shadows, strict=True)
     ]
 
@@ -91,13 +95,13 @@ class _Shining(NamedTuple):
 
 
 def _of_edge(
-    scene: Scene, looks: list[Look], sides: _Sides, most: np.ndarray, shaded: np.ndarray, lost: np.ndarray
+    scene: Scene, looks: list[Look], sides: _Sides, beyond: _Shown, shaded: np.ndarray, lost: np.ndarray
 ) -> Brightest:
-    """Of one edge; ``most`` (L, n) is the highest signal of each thing that may be behind it, ``shaded`` and ``lost``
-    (L,) say which lights leave a part, and all of it, in shadow."""
+    """Of one edge, and what may be behind it; ``shaded`` and ``lost`` (L,) say which lights leave some of it in shadow,
+    and which all."""
     ratios, spreads = [], []
     for look in looks:
-        highest, least, level = sides.contrast(scene, look, most)
+        highest, least, level = sides.contrast(scene, look, beyond)
         whole = highest.max(-1)
         with np.errstate(divide="ignore", invalid="ignore"):
             spread = np.fmax(whole / least, 1.0)
@@ -129,17 +133,42 @@ class _Sides(NamedTuple):
         alone = len(scene.lights) == 1
         return cls(*(sum(part) for part in signals), *(_step(part) for part in signals), alone)
 
-    def contrast(self, scene: Scene, look: Look, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def contrast(self, scene: Scene, look: Look, beyond: _Shown) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Squared contrast over noise, the most in each piece (L, PIECES) and the least of all (L,), and the highest
         level (L,). Of several lights some may leave a place in shadow, of which nothing is known but the most."""
-        noise, behind = scene.noise, most[:, list(look.behind)].max(-1, initial=0.0)
+        noise = scene.noise
         if look.side is None:
             sums = (self.most.sum(1), self.least.sum(1)) if self.alone else (self.near, self.far)
             high, low = (_over_noise(noise, *each) for each in zip((self.near, self.far), sums, strict=True))
             return high, low.min(-1) * self.alone, self.most.max((-1, -2))
-        high, low = self.most[:, look.side], self.least[:, look.side] * self.alone
-        least = np.where(behind == 0, _over_noise(noise, low, low).min(-1), 0.0)
-        return _most_before(noise, high, low, behind[:, None]), least, np.maximum(high.max(-1), behind)
+        own = self.most[:, look.side], self.least[:, look.side] * self.alone
+        other = beyond.most[:, list(look.behind)].max(-1), beyond.least[:, list(look.behind)].min(-1)
+        most, least = _before(noise, *own, *(part[:, None] for part in other))
+        return most, least.min(-1), np.maximum(own[0].max(-1), other[0])
+
+
+class _Shown(NamedTuple):
+    """The highest and the lowest signals (L, F + 2) of each face of the bodies, of the floor, and of darkness."""
+
+    most: np.ndarray
+    least: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, shining: _Shining, things: set[int]) -> _Shown:
+        """Of all of them the highest, of some ``things`` the lowest; where a place may be in shadow it is 0."""
+        bodies, at, white = scene.bodies, shining.at, whites(scene)
+        middles, radii = _spheres(bodies)
+        away = np.linalg.norm(at[:, None] - middles, axis=-1)
+        height = np.maximum(at @ bodies.normals.T - bodies.offsets, 0.0)
+        nearest = np.maximum(away - radii, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            most = np.where(bodies.plane, height / np.maximum(nearest, height) ** 3, 1 / nearest**2) * white
+        most = np.concatenate([np.where(np.isnan(most), 0.0, most), _of_floor(scene, at[:, 2])[:, None]], -1)
+        least = np.zeros((len(at), len(white) + 2))
+        for face in (thing for thing in things if 0 <= thing < len(white) and bodies.plane[thing]):
+            farthest = away[:, face] + radii[face]
+            least[:, face] = np.where(all_lit(bodies, face, at), white[face] * height[:, face] / farthest**3, 0.0)
+        return cls(shining.power * np.pad(most, ((0, 0), (0, 1))), shining.power * least)
 
 
 def _step(each: list[np.ndarray]) -> np.ndarray:
@@ -155,10 +184,18 @@ def _strengths(scene: Scene, edge: Edge, shining: _Shining) -> np.ndarray:
     return np.where(turned(bodies, edge, shining.at), height * whites(scene)[faces] * shining.power, 0.0)
 
 
-def _most_before(noise: Noise, high: np.ndarray, low: np.ndarray, behind: np.ndarray) -> np.ndarray:
-    """The most squared contrast over noise of what has between two signals, before what is dark or has one at most."""
-    lit = _over_noise(noise, np.maximum(behind - low, 0.0), behind + low)
-    return np.maximum(_over_noise(noise, high, high), lit)
+def _before(
+    noise: Noise, high: np.ndarray, low: np.ndarray, most: np.ndarray, least: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The most and the least squared contrast over noise of what has signals from ``low`` to ``high`` before what has
+    ``least`` to ``most``."""
+    over = _over_noise(noise, np.maximum(high - least, 0.0), high + least)
+    under = _over_noise(noise, np.maximum(most - low, 0.0), most + low)
+    apart = np.maximum(low - most, 0.0), np.maximum(least - high, 0.0)
+    nearest = np.maximum(
+        _over_noise(noise, apart[0], low + most), _over_noise(noise, apart[1], least + high)
+    )  # one of them is 0
+    return np.maximum(over, under), nearest
 
 
 def _over_noise(noise: Noise, step: np.ndarray, total: np.ndarray) -> np.ndarray:
@@ -188,18 +225,6 @@ def _shadows(bodies: Solid, edge: Edge, lights_at: list[np.ndarray]) -> tuple[np
     if len(lights_at) > 1:
         return shaded, np.zeros_like(shaded)
     return shaded, (longest_span(bodies, edge, lights_at[0]) == 0).all(-1)
-
-
-def _most(scene: Scene, shining: _Shining) -> np.ndarray:
-    """The highest signal (L, F + 1) of each face of the bodies, and of the floor."""
-    bodies, at = scene.bodies, shining.at
-    middles, radii = _spheres(bodies)
-    nearest = np.maximum(np.linalg.norm(at[:, None] - middles, axis=-1) - radii, 0.0)
-    height = np.maximum(at @ bodies.normals.T - bodies.offsets, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.where(bodies.plane, height / np.maximum(nearest, height) ** 3, 1 / nearest**2) * whites(scene)
-    found = np.where(np.isnan(found), 0.0, found)
-    return shining.power * np.concatenate([found, _of_floor(scene, at[:, 2])[:, None]], -1)
 
 
 def _of_floor(scene: Scene, height: np.ndarray) -> np.ndarray:

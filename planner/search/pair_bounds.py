@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imaging.features.locator import MIN_USABLE, lacking
+from imaging.features.locator import MIN_USABLE, correlation, lacking
 from imaging.features.measurand import Measurands, measurands
 from imaging.features.projected_edges import straight
 from imaging.geometry.projection import edge_points
@@ -26,7 +26,7 @@ from imaging.geometry.visibility import turned
 from imaging.light.appearance import has_background
 from imaging.light.behind import things_behind
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
-from imaging.models.calibrated import SHORT, line_slope, line_weight, point_products, point_variance
+from imaging.models.calibrated import POINT_WEIGHTS, POINTS, SHORT, line_slope, line_weight, point_variance, to_points
 from imaging.pictures import Pictures
 from planner.search.brightest import PIECES, Brightest, Look, brightest, is_bounded
 from planner.search.objective import Aim, SearchProblem
@@ -177,12 +177,12 @@ def _behind(
     if not len(rows):
         return [], np.zeros(0, int)
     if bodies.outer[edge.faces[1 - side]] and not has_background(scene):
-        return [Look(side)], np.zeros(len(rows), int)
+        return [Look(side, (-1,))], np.zeros(len(rows), int)
     some = Pictures.of(scene, pictures.sensors[rows])
     things = things_behind(some, points, np.isfinite(points).all(-1), edge.faces)
     there = np.zeros((len(rows), len(bodies.faces) + 2), bool)
-    np.put_along_axis(there, things, True, 1)  # nothing is the last
-    kinds, which, count = np.unique(there[:, :-1], axis=0, return_inverse=True, return_counts=True)
+    np.put_along_axis(there, things % there.shape[1], True, 1)  # darkness is the last
+    kinds, which, count = np.unique(there, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(-count, kind="stable")
     which, kinds = np.minimum(np.argsort(order)[which.ravel()], _WAYS), kinds[order]
     kinds = [*kinds[:_WAYS], *([kinds[_WAYS:].any(0)] if len(kinds) > _WAYS else [])]
@@ -194,11 +194,24 @@ def _of_line(nodes: EdgeNodes, a: np.ndarray, b: np.ndarray, scale: float) -> tu
     weight, slope, point = line_weight(nodes, a, b), line_slope(nodes, a, b), point_variance(nodes, scale)
     amount, weights, loss = _long(nodes, weight, slope, point * np.ones(weight.shape), scale)
     short = nodes.length[..., 0] < SHORT * scale
-    products = point_products((weight * np.sqrt(point))[short], nodes.length[short], scale)
-    amount[short] = products.sum((-1, -2))
-    loss[short] = np.sqrt(np.abs(products).sum((-1, -2)) / amount[short])
-    weights[short] = np.eye(PIECES + 1)[-1]
+    found, lost = _short((weight * np.sqrt(point))[short], nodes.length[short], scale)
+    amount[short], loss[short], weights[short] = np.fmin(found, amount[short]), lost, np.eye(PIECES + 1)[-1]
     return amount, weights, loss
+
+
+def _short(g: np.ndarray, length: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """``amount`` and ``loss`` (k,) of short edges, of which ``g`` (k, n) is what their nodes add at even contrast.
+
+    The sum over the points h K h, K their correlations, is h' K h' at uneven contrast and not less than (h' K h)^2 over
+    h K h (Cauchy and Schwarz). h' K h is a sum over the nodes, each times sqrt(1 / R) there: that R may be less than
+    elsewhere counts only where a node's part is negative.
+    """
+    step = POINT_WEIGHTS * length / 2
+    kernel = correlation((POINTS[:, None] - POINTS) * length[..., None] / 2, scale)
+    pulled = np.einsum("kij,kj->ki", kernel, g @ to_points().T * step)
+    parts = g * (pulled * step @ to_points())
+    amount = parts.sum(-1)
+    return amount, -np.minimum(parts, 0.0).sum(-1) / amount
 
 
 def _long(

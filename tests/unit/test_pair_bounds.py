@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import scenes
+from imaging.geometry.projection import direction
+from imaging.geometry.rays import reaches
 from planner.search import brightest, exhaustive
+from planner.search.lit import all_lit
 from planner.search.objective import SearchProblem
 from planner.search.pair_bounds import PairBounds, has_pair_bounds
 from tests.bounded import all_values, drawn_lights, drawn_poses, drawn_problem
@@ -36,14 +39,17 @@ def test_no_value_is_below_its_bound():
     assert caught > 20
 
 
-def _lit(noise, high, low, behind):
+def _lit(noise, high, low, most, least):
     """As if no shadow fell on what is behind an edge."""
-    return brightest._over_noise(noise, np.maximum(behind - low, high - behind), behind + low)
+    return _BEFORE(noise, high, low, most, np.where(most > 0, most, least))
 
 
-def _nothing(noise, high, low, behind):
+def _nothing(noise, high, low, most, least):
     """As if nothing were there."""
-    return brightest._over_noise(noise, high, high)
+    return _BEFORE(noise, high, low, 0 * most, 0 * least)
+
+
+_BEFORE = brightest._before
 
 
 @pytest.mark.parametrize("wrong", [_lit, _nothing])
@@ -54,7 +60,7 @@ def test_without_shadows_or_what_is_behind_a_bound_is_contradicted(wrong, monkey
     poses = drawn_poses(rng, 15), drawn_poses(rng, 30)
     values = all_values(problem, *poses)
     assert (told(PairBounds.of(problem, *poses)) <= values).all()  # margin: a bound, by its kind
-    monkeypatch.setattr(brightest, "_most_before", wrong)
+    monkeypatch.setattr(brightest, "_before", wrong)
     assert (told(PairBounds.of(problem, *poses)) > values).any()
 
 
@@ -83,6 +89,26 @@ def test_the_search_is_that_of_all_pairs(seed):
     assert (found.least[~near] > 0.99 * exhaustive.DEAREST * values.min()).all()
     assert found.evaluated < values.size == found.pairs
     assert found.guaranteed
+
+
+@pytest.mark.parametrize("name", ["bracket", "plate"])
+def test_faces_that_are_all_lit_have_no_place_in_shadow(name):
+    """By rays from drawn places of plane faces to drawn lights; of an inner face some lights reach a part only."""
+    scene, rng = scenes.load(name), np.random.default_rng(4)
+    bodies, lights = scene.bodies, 100 * direction(drawn_poses(rng, 40))
+    known, free = [], []
+    for face in np.flatnonzero(bodies.plane).tolist():
+        corners = bodies.triangles[bodies.triangle_faces == face]
+        shares = rng.dirichlet(np.ones(3), (60, len(corners)))
+        places = np.einsum("nti,tij->ntj", shares, corners).reshape(-1, 3)
+        known.append(all_lit(bodies, face, lights))
+        at = np.broadcast_to(lights[:, None], (len(lights), *places.shape))
+        over = reaches(bodies, np.broadcast_to(places, at.shape), np.full(at.shape[:-1], face), at)
+        free.append(over.mean(1))
+    known, free = np.array(known), np.array(free)
+    assert (free[known] == 1).all()
+    assert known.sum() > 0.8 * (free == 1).sum() if name == "bracket" else known.any()
+    assert ((free > 0) & (free < 1)).any() == (name == "bracket")
 
 
 def test_which_scenes_have_bounds():
