@@ -26,6 +26,7 @@ WITHIN = 0.01
 MOST_PAIRS = 5_000_000  # of cells: some minutes
 GRID_STEP = 1.0  # degrees, where a certificate is of the pairs of a grid
 _MOST_EVALUATED = 50_000  # of them
+_LEAST_TOLD = 0.1  # %
 _CLOSELY = 3  # places beside a better one that are looked at closely
 
 
@@ -62,10 +63,10 @@ class Certificate:
     def told(self) -> str:
         """In one sentence, without its end."""
         if self.grid_deg is not None:
-            part = 100 * (1 - self.better_by)
-            return (
-                f"at a glance, no pair of the {self.grid_deg:g} degree grid has less than {part:.3g} % of this variance"
-            )
+            part, grid = 100 * (1 - self.better_by), f"the {self.grid_deg:g} degree grid"
+            if part < _LEAST_TOLD:
+                return f"at a glance, of some pairs of {grid} nothing is known"
+            return f"at a glance, no pair of {grid} has less than {part:.3g} % of this variance"
         poses = "no pose" + " whose levels are within the sensor's scale" * self.within_scale
         return (
             f"{poses}, also between those of a grid, has less than {100 * (1 - self.better_by):.3g} % of this variance"

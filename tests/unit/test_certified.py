@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 import planner
 import scenes
 from planner.certifying.cells import Boxes, LightCells, SensorCells, bounds
+from planner.certifying.certificate import Certificate
 from planner.certifying.enclosed import cosine, sine, variables
 from planner.certifying.light_terms import LightTerms
 from planner.certifying.sensor_terms import SensorTerms
@@ -150,6 +151,12 @@ def test_a_certificate_of_a_grid(most, monkeypatch):
     assert told.told.startswith("at a glance, no pair of the 5 degree grid has less than")
     if told.proved:
         assert 1.02 * told.least > values.min()
+
+
+def test_where_nothing_is_known_of_a_pair_that_is_said():
+    """In place of a part of the variance that is none."""
+    told = Certificate(False, 0.01, 1.0, 0.0, 400, False, grid_deg=2.0).told
+    assert told == "at a glance, of some pairs of the 2 degree grid nothing is known"
 
 
 def test_the_command():
