@@ -106,9 +106,8 @@ def best_pair(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, r
     not exceed the best variance known are evaluated. So it is, by a bound that is less near, of other matt parts under
     points of light (`pair_bounds`). Otherwise every pair is evaluated.
     """
-    if has_bound(problem.scene, problem.model):
-        return _by_bound(problem, sensors, lights, report)
     search = _best_first if has_pair_bounds(problem.scene, problem.model) else _one_by_one
+    search = _by_bound if has_bound(problem.scene, problem.model) else search
     return search(problem, sensors, lights, report)
 
 
