@@ -60,6 +60,20 @@ def behind(
     return np.where(wanted, found, 0.0)
 
 
+def things_behind(pictures: Pictures, points: np.ndarray, wanted: np.ndarray, own: tuple[int, ...]) -> np.ndarray:
+    """What the sensor sees just past points of an edge, whatever the light, int (..., n).
+
+    The number of a face of the bodies, that after the last for the floor, -1 for nothing and where not wanted;
+    parameters as of `behind`.
+    """
+    scene, bodies = pictures.scene, pictures.scene.bodies
+    vectors = -pictures.viewpoint.widened().towards(points)
+    face, t = _met(bodies, points, vectors, wanted, own)
+    if scene.bright_floor is not None:
+        face = np.where(_on_floor(scene.bright_floor, points, vectors, t)[1], len(bodies.faces), face)
+    return np.where(wanted, face, -1)
+
+
 def seen_at(pictures: Pictures, image: np.ndarray) -> np.ndarray:
     """Signal of what the sensor of one picture sees at image points (n, 2) from the middle, ideal px, shape (n,)."""
     return seen_by_rays(

@@ -8,25 +8,31 @@ from itertools import islice
 import numpy as np
 
 from planner.certifying.cells import Boxes
+from planner.certifying.on_grid import Proven
 from planner.certifying.pulls import is_known
 from planner.certifying.search import LIGHTS, SENSORS, Found, Search
 from planner.constraints import WHOLE, Constraints, turn_of
 from planner.planning import Plan
 from planner.search.candidates import RayTraced, SettingUp
 from planner.search.exhaustive import has_bound
-from planner.search.grid import as_array, as_poses
+from planner.search.grid import Grid, as_array, as_poses
+from planner.search.local import refine
 from planner.search.objective import Aim, Report, SearchProblem
+from planner.search.pair_bounds import has_pair_bounds
 from scenes import InvalidInput, Pose, Scene
 from scenes.status import is_trusted
 
 WITHIN = 0.01
 MOST_PAIRS = 5_000_000  # of cells: some minutes
+GRID_STEP = 1.0  # degrees, where a certificate is of the pairs of a grid
+_MOST_EVALUATED = 50_000  # of them
+_LEAST_TOLD = 0.1  # %
 _CLOSELY = 3  # places beside a better one that are looked at closely
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What is proved of all poses of sensor and light that a plan's constraints allow.
+    """What is proved of all poses of sensor and light that a plan's constraints allow, or of those of a grid.
 
     Attributes
     ----------
@@ -38,9 +44,11 @@ class Certificate:
     least : float
         What no pose is below.
     pairs : int
-        Pairs of cells of poses that were bounded.
+        Pairs of cells of poses that were bounded, or pairs of the grid.
     within_scale : bool
         Whether this is of those poses alone whose levels the end of the scale does not cut off.
+    grid_deg : float, optional
+        Step of the grid whose pairs alone this is of, by what a glance says of them; None of all poses.
     """
 
     proved: bool
@@ -49,10 +57,16 @@ class Certificate:
     least: float
     pairs: int
     within_scale: bool
+    grid_deg: float | None = None
 
     @property
     def told(self) -> str:
         """In one sentence, without its end."""
+        if self.grid_deg is not None:
+            part, grid = 100 * (1 - self.better_by), f"the {self.grid_deg:g} degree grid"
+            if part < _LEAST_TOLD:
+                return f"at a glance, of some pairs of {grid} nothing is known"
+            return f"at a glance, no pair of {grid} has less than {part:.3g} % of this variance"
         poses = "no pose" + " whose levels are within the sensor's scale" * self.within_scale
         return (
             f"{poses}, also between those of a grid, has less than {100 * (1 - self.better_by):.3g} % of this variance"
@@ -65,15 +79,19 @@ def certified(
     *,
     within: float = WITHIN,
     most: int = MOST_PAIRS,
+    step_deg: float = GRID_STEP,
     report: Report | None = None,
 ) -> Plan:
     """The plan, or a better one that is found on the way, with its certificate.
 
-    All poses within the constraints' polar angles and azimuths are covered by cells of the sensor's and the light's
-    poses, which are divided until a lower bound of what `predict` says in a pair of cells excludes it. Of one convex
-    matt part under one free point of light, by the ``calibrated`` model, in the object. It is assumed that the variance
-    of no edge is negative, and that rounding errors are below a relative 1e-9. Constraints on what the sensor sees, and
-    forbidden regions, only leave out places that the certificate covers, too.
+    Of a convex part all poses within the constraints' polar angles and azimuths are covered by cells of the sensor's
+    and the light's poses, which are divided until a lower bound of what `predict` says in a pair of cells excludes it.
+    Of one matt part under one free point of light, by the ``calibrated`` model, in the object. It is assumed that the
+    variance of no edge is negative, and that rounding errors are below a relative 1e-9. Constraints on what the sensor
+    sees, and forbidden regions, only leave out places that the certificate covers, too.
+
+    Of other matt parts under points of light of which one is free, hollow ones and such on a floor, it is of all pairs
+    of a grid, by what a glance says of them: without the light that surfaces send to each other.
 
     Parameters
     ----------
@@ -84,6 +102,8 @@ def certified(
         The share that is to be proved.
     most : int
         Pairs of cells after which it ends, unproved.
+    step_deg : float
+        Of the grid.
 
     Raises
     ------
@@ -103,16 +123,37 @@ def certified(
     if not 0 < within < 1:
         raise InvalidInput(f"within must be above 0 and below 1, got {within}")
     problem = SearchProblem(scene, found.model, Aim.of(scene.quantities, found.objective, found.over), limits)
+    if not has_terms(scene):
+        return _on_grid(problem, found, step_deg, within, report or (lambda *_: None))
     boxes = (
         Boxes.over(limits.sensor_polar_deg or WHOLE, _range(limits.sensor_azimuth_deg), SENSORS),
         Boxes.over(limits.light_polar_deg or WHOLE, _range(limits.light_azimuth_deg), LIGHTS),
     )
-    start = Found(found.variance, np.array(list(found.sensor)), as_array(found.light))
+    start = Found(found.variance, *_setting(found))
     known = Search.of(problem, start, boxes, within, most).run(report or (lambda *_: None))
     better = _better(problem, found, known) if known.value < found.variance else found
     by = max(0.0, 1 - known.least / better.variance)
     told = Certificate(by <= within * (1 + 1e-9), within, by, float(known.least), known.pairs, known.within_scale)
     return replace(better, certificate=told)
+
+
+def _on_grid(problem: SearchProblem, found: Plan, step_deg: float, within: float, report: Report) -> Plan:
+    """The same of the pairs of a grid."""
+    grid, start = Grid.of(problem.scene, problem.constraints, step_deg), _setting(found)
+    known = Proven.of(problem, grid, start, within, _MOST_EVALUATED, report)
+    better = found
+    if known.sensor is not start[0]:
+        end = refine(problem, (known.sensor, known.light), step_deg, known=known.value)
+        better = _better(problem, found, Found(end.value, end.sensor, end.lights))
+    value = float(problem.values(*(pose[None] for pose in _setting(better)))[0])
+    by = max(0.0, 1 - known.least / value)
+    told = Certificate(by <= within * (1 + 1e-9), within, by, known.least, known.pairs, False, step_deg)
+    return replace(better, certificate=told)
+
+
+def _setting(found: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """Sensor (2,) and free lights (2 F,), degrees."""
+    return np.array(list(found.sensor)), as_array(found.light)
 
 
 def _better(problem: SearchProblem, found: Plan, known: Found) -> Plan:
@@ -138,10 +179,10 @@ def check_certifiable(found: Plan, limits: Constraints) -> None:
         )
     if limits.same_mount:
         raise InvalidInput("same_mount must be left out for a certificate, got both")
-    if not has_terms(scene):
+    if not has_terms(scene) and not (has_pair_bounds(scene, found.model) and len(scene.free) == 1):
         raise InvalidInput(
-            "scene must be of one matt convex part, distances of corners, one free point of light and a perspective "
-            f"lens without distortion for a certificate, got {scene.name}"
+            "scene must be of matt parts without print, straight edges among what is measured, and points of light of "
+            f"which one is free for a certificate, got {scene.name}"
         )
 
 

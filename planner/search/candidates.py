@@ -23,7 +23,7 @@ from imaging.models.errors import Errors
 from imaging.pictures import Pictures
 from planner.prediction import Prediction, predict
 from planner.ranks import quantity_ranks
-from planner.search.exhaustive import BestPair, best_pair
+from planner.search.exhaustive import DEAREST, BestPair, best_pair
 from planner.search.grid import APART, Feasible, Grid, as_array, as_poses, distinct
 from planner.search.lights import Mixture, best_lights
 from planner.search.local import Partial, alternating, shifted
@@ -33,7 +33,6 @@ from scenes.pose import DIGITS
 from scenes.status import WORST_FIRST, is_trusted
 from scenes.uncertain import Uncertain
 
-DEAREST = 4.0  # times the least variance that is paid for trust: standard deviations are twice as large
 AROUND = 0.2  # degrees: how far off everything has to be measurable, at least
 STEEPEST = 4.0  # times the variance that is lost by standing so far off: standard deviations are twice as large
 _SHELLS = (0.4, 0.8, 1.6, 3.2)  # degrees from an optimum that cannot be set up

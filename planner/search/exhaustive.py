@@ -36,10 +36,14 @@ from imaging.pictures import Pictures
 from imaging.sensor import headroom, shot_noise
 from planner.constraints import Constraints
 from planner.search.objective import Aim, Report, SearchProblem, cut_off, minimised
+from planner.search.pair_bounds import PairBounds, has_pair_bounds
 from scenes import Circle, Scene
 
 _ROWS = 256  # sensors at a time
 _PAIRS = 1 << 16  # pairs evaluated exactly at a time
+_SENSORS, _FIRST = 16, 8  # sensors that are settled at a time, and lights that are tried first with each
+_LIGHTS = 1024  # evaluated with them at a time
+DEAREST = 4.0  # times the least variance that is paid for trust: standard deviations are twice as large
 _DEGREE = 7  # of the interpolation along an edge: exact for r^6, and about 1e-9 for the smooth functions here
 _MARGIN = 3e-6  # relative; single precision in sums of about 30 terms of like size
 
@@ -99,9 +103,11 @@ def best_pair(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, r
     """The best of all pairs of sensors (S, 2) and lights (L, 2 F), degrees; F lights are free.
 
     For a convex diffuse solid a rigorous lower bound of every pair is one matrix product; only pairs whose bound does
-    not exceed the best variance known are evaluated. Otherwise every pair is evaluated.
+    not exceed the best variance known are evaluated. So it is, by a bound that is less near, of other matt parts under
+    points of light (`pair_bounds`). Otherwise every pair is evaluated.
     """
-    search = _by_bound if has_bound(problem.scene, problem.model) else _one_by_one
+    search = _best_first if has_pair_bounds(problem.scene, problem.model) else _one_by_one
+    search = _by_bound if has_bound(problem.scene, problem.model) else search
     return search(problem, sensors, lights, report)
 
 
@@ -158,13 +164,65 @@ def _one_by_one(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray,
         for k, some in enumerate((values, np.where(cut_off(errors, problem.scene), np.inf, values))):
             column[k, seeing[part]] = some.argmin(1)
             least[k, seeing[part]] = some.min(1)
+    pairs = len(sensors) * len(lights)
+    return _chosen(least, column, pairs, pairs)
+
+
+def _chosen(least: np.ndarray, column: np.ndarray, pairs: int, evaluated: int) -> BestPair:
+    """The best pair from what each sensor can do, and by which light: with all, and with those within the scale, which
+    are taken if there are any; (2, S) each."""
     within = bool(np.isfinite(least[1]).any())
     spared = within and bool((least[1] > least[0]).any())
     column, least = column[int(within)].astype(int), least[int(within)]
     column[~np.isfinite(least)] = -1
-    variance, *pair = _better(_NONE, np.arange(len(sensors)), column, least)
-    pairs = len(sensors) * len(lights)
-    return BestPair(*pair, variance, pairs, pairs, column, least, guaranteed=True, within_scale=spared)
+    variance, *pair = _better(_NONE, np.arange(len(least)), column, least)
+    return BestPair(*pair, variance, pairs, evaluated, column, least, guaranteed=True, within_scale=spared)
+
+
+def _best_first(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> BestPair:
+    """As pair by pair, but for pairs that bounds exclude: of sensors beyond `DEAREST` the least is a bound."""
+    bounds = PairBounds.of(problem, sensors, lights)
+    least, column = np.full((2, len(sensors)), np.inf), np.full((2, len(sensors)), -1)
+    for part, bound in bounds.blocks(np.arange(len(sensors))):
+        least[:, part], column[:, part] = bound.min(1), bound.argmin(1)
+    order, evaluated = np.argsort(least[0], kind="stable"), 0
+    order = order[np.isfinite(least[0, order])]
+    for at in range(0, len(order), _SENSORS):
+        far = DEAREST * least[1, order[:at]].min(initial=np.inf)
+        rows = order[at : at + _SENSORS]
+        if not least[1, rows[0]] <= far:
+            break
+        told, asked = _settled(problem, sensors[rows], lights, bounds.rows(rows), far)
+        least[:, rows], column[:, rows] = told.min(-1), told.argmin(-1)
+        evaluated += asked
+        report("evaluating pairs", at + len(rows), len(order))
+    report("evaluating pairs", len(order), len(order))
+    return _chosen(least, column, len(sensors) * len(lights), evaluated)
+
+
+def _settled(
+    problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, bound: np.ndarray, far: float
+) -> tuple[np.ndarray, int]:
+    """What is minimised by sensors (n, 2) and lights, of all pairs and of those within the scale, (2, n, L): evaluated
+    where a bound is neither above the least of its sensor nor ``far``, else the bound; and how many were evaluated.
+
+    Lights that are asked for with one of the sensors are evaluated with all, which takes less time than pairs do.
+    """
+    told, asked = np.stack([bound, bound]).astype(float), np.zeros(bound.shape[1], bool)
+    first = np.argpartition(bound, min(_FIRST, bound.shape[1] - 1), 1)[:, :_FIRST]
+    wanted = np.zeros(bound.shape, bool)
+    np.put_along_axis(wanted, first, True, 1)
+    for _ in range(2):
+        some = np.flatnonzero((wanted & (bound <= far) & np.isfinite(bound)).any(0) & ~asked)
+        for at in range(0, len(some), _LIGHTS):
+            columns = some[at : at + _LIGHTS]
+            errors = problem.errors(sensors[:, None], lights[None, columns])
+            values = np.where(np.isfinite(bound[:, columns]), minimised(errors, problem.objective), np.inf)
+            told[:, :, columns] = values, np.where(cut_off(errors, problem.scene), np.inf, values)
+        asked[some] = True
+        known = np.where(asked, told[1], np.inf).min(1, keepdims=True)
+        wanted = bound <= known
+    return told, int(asked.sum() * len(sensors))
 
 
 def _seeing(scene: Scene, sensors: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ from tests.proofs.lights import lights
 from tests.proofs.limbs import limbs
 from tests.proofs.mixed import mixed
 from tests.proofs.msa import msa
+from tests.proofs.pair_bounds import pair_bounds
 from tests.proofs.pairs import pairs
 from tests.proofs.parts import parts
 from tests.proofs.peer import peer
@@ -73,6 +74,7 @@ app.command()(lights)
 app.command()(limbs)
 app.command()(mixed)
 app.command()(msa)
+app.command()(pair_bounds)
 app.command()(pairs)
 app.command()(parts)
 app.command()(peer)

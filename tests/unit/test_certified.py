@@ -10,11 +10,14 @@ from typer.testing import CliRunner
 import planner
 import scenes
 from planner.certifying.cells import Boxes, LightCells, SensorCells, bounds
+from planner.certifying.certificate import Certificate
 from planner.certifying.enclosed import cosine, sine, variables
 from planner.certifying.light_terms import LightTerms
 from planner.certifying.sensor_terms import SensorTerms
+from planner.search.grid import Grid
 from planner.search.objective import SearchProblem
 from scenes import InvalidInput
+from tests.bounded import all_values
 from validation.cli.main import app
 
 NEAR = planner.Constraints(sensor_polar_deg=(25, 28), sensor_azimuth_deg=(10, 14), light_polar_deg=(10, 20))
@@ -119,12 +122,41 @@ def test_a_certificate_of_a_small_range_and_a_better_place():
     assert not short.certificate.proved
 
 
-@pytest.mark.parametrize("name", ["bracket", "glossy_metal", "two_lights"])
+@pytest.mark.parametrize("name", ["printed_label", "glossy_metal", "two_lights"])
 def test_other_scenes_are_refused(name):
-    """Hollow, glossy, of two lights: there are no bounds."""
+    """Printed, glossy, of two free lights: there are no bounds."""
     plan = planner.plan(scenes.load("task1"), constraints=NEAR, step_deg=3, refined=False)
-    with pytest.raises(InvalidInput, match="scene must be of one matt convex part"):
+    with pytest.raises(InvalidInput, match="scene must be of matt parts without print"):
         planner.certified(replace(plan, scene=scenes.load(name)), NEAR)
+
+
+BESIDE = planner.Constraints(sensor_polar_deg=(30, 50), sensor_azimuth_deg=(90, 140), light_polar_deg=(5, 25))
+
+
+@pytest.mark.parametrize("most", [50_000, 40])
+def test_a_certificate_of_a_grid(most, monkeypatch):
+    """Of a hollow part: no pair of the grid is below what is said; how near it is hangs on how many are evaluated."""
+    monkeypatch.setattr("planner.certifying.certificate._MOST_EVALUATED", most)
+    bracket = scenes.load("bracket")
+    poor = planner.plan(bracket, constraints=BESIDE, step_deg=15, refined=False)
+    found = planner.certified(poor, BESIDE, step_deg=5)
+    told = found.certificate
+    grid = Grid.of(bracket, BESIDE.on_side_of(bracket), 5.0)
+    values = all_values(SearchProblem.of(bracket, "calibrated", "object"), grid.sensors, grid.lights)
+    assert told.pairs == values.size
+    assert told.least <= values.min()  # margin: a bound, by its kind
+    assert told.proved == (most > 40)
+    assert (found.variance < poor.variance) == told.proved
+    assert told.better_by < (0.01 if told.proved else 0.9)
+    assert told.told.startswith("at a glance, no pair of the 5 degree grid has less than")
+    if told.proved:
+        assert 1.02 * told.least > values.min()
+
+
+def test_where_nothing_is_known_of_a_pair_that_is_said():
+    """In place of a part of the variance that is none."""
+    told = Certificate(False, 0.01, 1.0, 0.0, 400, False, grid_deg=2.0).told
+    assert told == "at a glance, of some pairs of the 2 degree grid nothing is known"
 
 
 def test_the_command():
@@ -134,7 +166,8 @@ def test_the_command():
     told = CliRunner().invoke(app, ["plan", "task1", "--certify", "--step", "3", *narrow])
     assert told.exit_code == 0, told.output
     facts = json.loads(told.stdout)["certificate"]
-    assert set(facts) == {"proved", "within", "better_by", "least", "pairs", "within_scale"}
+    assert set(facts) == {"proved", "within", "better_by", "least", "pairs", "within_scale", "grid_deg"}
+    assert facts["grid_deg"] is None
     assert facts["proved"], told.output
     refused = CliRunner().invoke(app, ["plan", "task1", "--certify", "--views", "2"])
     assert refused.exit_code != 0

@@ -116,7 +116,10 @@ class Options:
         bool,
         typer.Option(
             "--certify",
-            help="Prove that no pose at all is better by over 1 % (a matt convex part, a point light).",
+            help=(
+                "Prove that no pose at all is better by over 1 % (a matt convex part, a point light); of other matt "
+                "parts, none of a 1 degree grid, or by how much."
+            ),
         ),
     ] = False
     check: Annotated[
@@ -297,7 +300,7 @@ def _planned(scene: scenes.Scene, given: Options, how: dict, count: int) -> Plan
     how |= {"search": given.search, "edges": given.edges, "shares": given.shares}
     found, seconds = _plan(scene, given.objective, how | _varied(scene, given.vary, given.hold))
     if given.certify:
-        found = _certified(found, how["constraints"])
+        found = _certified(found, how["constraints"], given.step)
     safe = planner.robust(found, tolerances, how["constraints"]) if tolerances else None
     checked = _check(found, count, asked=given.check is not None) if count else None
     scatter = _check_varied(found) if found.varied and count else None
@@ -362,11 +365,12 @@ def _plan(scene: scenes.Scene, objective: str, how: dict) -> tuple[planner.Plan,
     return found, time.perf_counter() - began
 
 
-def _certified(found: planner.Plan, limits: planner.Constraints) -> planner.Plan:
+def _certified(found: planner.Plan, limits: planner.Constraints, step: float | None) -> planner.Plan:
     import planner
+    from planner.certifying.certificate import GRID_STEP
 
-    with progress(f"{found.scene.name}: excluding all poses that would be better", "cells", at_once=True) as shown:
-        return planner.certified(found, limits, report=shown)
+    with progress(f"{found.scene.name}: excluding all poses that would be better", "steps", at_once=True) as shown:
+        return planner.certified(found, limits, step_deg=GRID_STEP if step is None else step, report=shown)
 
 
 def _check(found: planner.Plan, count: int, asked: bool) -> PlanCheck:
