@@ -390,7 +390,7 @@ def test_where_any_value_is_in_doubt_a_simulation_is_named(
         for state, variance in zip(statuses, variances, strict=True)
     ]
     rows = [{"measurands": facts[:1]}, {"measurands": facts[1:]}]
-    monkeypatch.setattr(predict.scenes, "load", given(name="a"))
+    monkeypatch.setattr(predict, "scene_of", given(name="a"))
     monkeypatch.setattr("planner.predict", lambda picture, model: picture)
     for name, told in (
         ("_pictures", [0, 1]), ("_simulated", rows), ("_table", "the table"), ("doubtful_edges", ["doubtful"]),
