@@ -10,7 +10,7 @@ from imaging.geometry.projection import direction
 from scenes.errors import InvalidInput
 from scenes.parts import mesh
 from scenes.parts.caps import caps
-from validation.cli.common import scene_of
+from validation.cli.common import scene_of, warn_of_open
 
 
 def without(part, gone):
@@ -128,3 +128,5 @@ def test_it_is_warned_of(tray, capsys):
     assert capsys.readouterr().err.startswith("Warning: object.file has open places closed by faces of which nothing")
     scene_of("task1")
     assert not capsys.readouterr().err
+    warn_of_open(scenes.load(str(tray)), scenes.load("task1"), scenes.load(str(tray)))
+    assert capsys.readouterr().err.count("Warning: ") == 2

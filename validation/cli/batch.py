@@ -28,6 +28,7 @@ from validation.cli.common import (
     progress,
     taking,
     tolerance,
+    warn_of_open,
 )
 from validation.cli.outputs import check_directory
 from validation.defaults import DEFAULT_SEED
@@ -131,6 +132,7 @@ def validate_command(given: Options) -> None:
     check_number("workers", given.workers, 1, MOST_WORKERS)
     check_seed(given.seed)
     loaded = campaign.load(given.scene)
+    warn_of_open(*loaded.scenes)
     loaded = loaded if given.estimators is None else _measured_by(loaded, given.estimators)
     directory = given.out or Path("runs") / loaded.name
     check_directory("--out", directory)

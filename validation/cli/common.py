@@ -77,9 +77,15 @@ def taking(options: type[Given]) -> Callable[[Callable[[Given], None]], Callable
 def scene_of(name: str) -> Scene:
     """A scene; on standard error what its part's file leaves open."""
     scene = load(name)
-    if scene.solid.caps and not verbosity.quiet():
-        print(f"Warning: object.file has {scene.solid.mended[-1]}, and no plan looks at them", file=sys.stderr)
+    warn_of_open(scene)
     return scene
+
+
+def warn_of_open(*several: Scene) -> None:
+    """Say on standard error what the files of scenes' parts leave open."""
+    for scene in several:
+        if scene.solid.caps and not verbosity.quiet():
+            print(f"Warning: object.file has {scene.solid.mended[-1]}, and no plan looks at them", file=sys.stderr)
 
 
 def tolerance(bias_px: float | None, variance: float | None) -> EffectTolerance:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from validation.batch import campaign
-from validation.cli.common import Json, SceneName, Seed, check_seed, commands, progress
+from validation.cli.common import Json, SceneName, Seed, check_seed, commands, progress, warn_of_open
 from validation.cli.outputs import check_directory
 from validation.defaults import DEFAULT_SEED
 from validation.report.terminal import console
@@ -33,6 +33,7 @@ def cost_command(
     """
     check_seed(seed)
     loaded = campaign.load(scene)
+    warn_of_open(*loaded.scenes)
     directory = out or Path("runs") / f"{loaded.name}-cost"
     check_directory("--out", directory)
     from validation.cost.goal import seconds

@@ -23,6 +23,7 @@ from validation.cli.common import (
     progress,
     say,
     taking,
+    warn_of_open,
 )
 from validation.cli.outputs import check_directory
 from validation.defaults import DEFAULT_SEED
@@ -66,7 +67,9 @@ def dossier_command(given: Options) -> None:
     _check(given)
     from validation.batch.campaign import load
 
-    name = load(given.scene).name
+    loaded = load(given.scene)
+    warn_of_open(*loaded.scenes)
+    name = loaded.name
     directory = given.out or Path("dossiers") / name
     check_directory("--out", directory)
     from validation.dossier import Size, make
