@@ -388,7 +388,7 @@ def test_two_pictures_are_measured_as_told(roof):
     ratio = found.value.var(0, ddof=1) / found.sigma.mean(0) ** 2
     assert (np.abs(ratio - 1) < 4 * np.sqrt(2 / count)).all(), ratio
     assert (np.abs(found.value.mean(0) - found.nominal) < (0.3 + 4 / np.sqrt(count)) * found.sigma.mean(0)).all()
-    predicted = planner.predict_bundle(roof[:2], "known")
+    predicted = planner.predict_bundle(roof[:2], "known", model="calibrated")
     one = measure.bundle([(stack[0], each) for stack, each in shots], "known", estimator="gradient")
     np.testing.assert_allclose(one.sigma, predicted.sigma, rtol=0.1)
     assert set(one.status) == set(predicted.status) == {"clutter"}
