@@ -16,11 +16,12 @@ import trimesh
 from scenes.parts.chains import Chain
 from scenes.parts.facets import Facets
 from scenes.parts.rims import Rim, simple_loops
+from scenes.parts.surfaces import axes_beside
 
 _FLAT = 1e-3  # of its size: how far corners of a boundary may be off its plane, to be closed together with others in it
 _SAME = np.cos(np.radians(0.1))  # between planes
 _BENDS = np.cos(np.radians(12.0))  # most between facets of a curved surface, as files divide them
-_SAID = 3  # places
+SAID = 3  # places
 
 
 def caps(vertices: np.ndarray, halves: np.ndarray) -> list[np.ndarray]:
@@ -62,20 +63,13 @@ def _in_planes(loops: list[np.ndarray], vertices: np.ndarray) -> Iterator[tuple[
         flat = np.abs((vertices[loops[first]] - middle) @ normal).max() <= near
         together = [first, *(there if flat else ())]
         left = [k for k in left if k not in together]
-        yield [loops[k] for k in together], _frame(normal)
+        yield [loops[k] for k in together], np.stack(axes_beside(normal))
 
 
 def _area(points: np.ndarray) -> np.ndarray:
     """Vector area inside of a closed line of points (n, 3)."""
     away = points - points[0]
     return np.cross(away[1:-1], away[2:]).sum(0) / 2
-
-
-def _frame(normal: np.ndarray) -> np.ndarray:
-    """Two axes about a normal, counter-clockwise."""
-    one = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    one /= max(float(np.linalg.norm(one)), np.finfo(float).tiny)
-    return np.stack([one, np.cross(normal, one)])
 
 
 def unknown(chains: list[Chain], normals: np.ndarray, filled: np.ndarray) -> np.ndarray:
@@ -104,14 +98,18 @@ def said(mesh: trimesh.Trimesh, group: np.ndarray, capped: np.ndarray) -> list[s
     """How many places have faces of their own as caps, and where the largest of them are."""
     place = np.where(capped[group], mesh.face_attributes["cap"], 0)
     area = np.bincount(place, mesh.area_faces, int(place.max()) + 1)[1:]
-    largest = np.argsort(-area, kind="stable")[: min(_SAID, int((area > 0).sum()))] + 1
+    largest = np.argsort(-area, kind="stable")[: min(SAID, int((area > 0).sum()))] + 1
     if not len(largest):
         return []
     middles = [
         np.average(mesh.triangles_center[place == k], axis=0, weights=mesh.area_faces[place == k]) for k in largest
     ]
-    places = ", ".join("({:.4g}, {:.4g}, {:.4g})".format(*each) for each in np.round(middles, 9) + 0.0)
     return [
-        f"open places closed by faces of which nothing is known: {(area > 0).sum()}, at {places}; edges beside them"
-        " measure nothing"
+        f"open places closed by faces of which nothing is known: {(area > 0).sum()}, at"
+        f" {listed(np.round(middles, 9) + 0.0)}; edges beside them measure nothing"
     ]
+
+
+def listed(places: np.ndarray) -> str:
+    """Places (n, 3) in words."""
+    return ", ".join("({:.4g}, {:.4g}, {:.4g})".format(*each) for each in places)

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from scenes.errors import InvalidInput
-from scenes.parts.caps import caps
+from scenes.parts.caps import SAID, caps, listed
 from scenes.parts.rows import different
 
 _GAP = 1e-5  # of the part's size: open edges that lie closer are one
@@ -23,7 +23,6 @@ _MOST_AROUND = 64  # corners of a slit
 _NO_AREA = 1e-14  # of the part's size, squared: a triangle of less has no plane
 _MOST_OPEN = 10_000  # edges: more are no seams between triangles that were meant to meet
 _SAME = 1e-5  # rad, between triangles of one plane
-_SAID = 3  # places of open edges
 
 
 def mended(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
@@ -328,5 +327,5 @@ def _open(faces: np.ndarray) -> np.ndarray:
 def _places(mesh: trimesh.Trimesh, edges: np.ndarray) -> str:
     """How many, and where the longest of them are."""
     length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
-    longest = mesh.vertices[edges[np.argsort(-length, kind="stable")[:_SAID]]].mean(1)
-    return f"{len(edges)}, at " + ", ".join("({:.4g}, {:.4g}, {:.4g})".format(*each) for each in longest)
+    longest = mesh.vertices[edges[np.argsort(-length, kind="stable")[:SAID]]].mean(1)
+    return f"{len(edges)}, at {listed(longest)}"
