@@ -1,7 +1,7 @@
 """``python -m tests.proofs placements``: parts that lie anywhere are found, and place and values are known as told.
 
 Three convex parts at random places (shifts to 5 mm, heights to 2 mm, turns and tilts to 3 degrees), each exposed once
-by the image model (`imaging.blurred.whole`), with noise drawn anew. Each is found without a start, its place adjusted
+by the image model (`imaging.blurred.whole`), or with ``--rendered`` by the renderer, with noise drawn anew. Each is found without a start, its place adjusted
 from its edges, its values measured. With ``--board`` a board behind it tells the place, shifts to 3 mm; where it lies
 beside the part, how large it is and where its points are is as uncertain as the scene says, and drawn anew each time.
 Pulls of place and values (error over told standard deviation) must have a spread of 1 within 5 % and a mean within 0.1.
@@ -13,6 +13,7 @@ place; the control is a measurement by who takes the focal length for what the s
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -25,8 +26,9 @@ import typer
 
 import measure
 import render
+from imaging.blurred.whole import image
 from imaging.features.kinds import on_plane
-from imaging.placed import difference
+from imaging.placed import difference, placed
 from measure.quantities import find, values
 from scenes import Picture
 from scenes.status import is_trusted
@@ -72,12 +74,12 @@ class Pulls:
         return Pulls(*counts, *lists, names=self.names or other.names, numbers=self.numbers or other.numbers)
 
 
-def one(picture: Picture, rng: np.random.Generator, found: Pulls) -> None:
-    """One place at random."""
+def one(picture: Picture, rng: np.random.Generator, found: Pulls, made: Callable[[Picture], np.ndarray]) -> None:
+    """One place at random, of which ``made`` makes a noise-free image."""
     there = printed.place(picture, rng)
-    (image,) = render.expose(printed.seen(printed.drawn(picture, rng), there), picture.scene.noise, rng, 1)
+    (shot,) = render.expose(made(placed(printed.drawn(picture, rng), there)), picture.scene.noise, rng, 1)
     found.tried += 1
-    where = measure.locate(image, picture)
+    where = measure.locate(shot, picture)
     if where.status != "ok":
         found.refused += 1
         return
@@ -85,7 +87,7 @@ def one(picture: Picture, rng: np.random.Generator, found: Pulls) -> None:
     if np.abs(pull).max() > 6:
         found.wrong += 1
         return
-    told = measure.measure(image, where.picture)
+    told = measure.measure(shot, where.picture)
     if not is_trusted(told.status).all():
         found.refused += 1
         return
@@ -93,25 +95,25 @@ def one(picture: Picture, rng: np.random.Generator, found: Pulls) -> None:
     off = told.value - told.nominal
     found.values.append(off / np.hypot(told.sigma, told.u_placed))
     if picture.scene.placement.camera:
-        values, place = _as_said(image, picture, there)
+        values, place = _as_said(shot, picture, there)
         found.at_known.append(values)
         found.elsewhere.append(place)
     else:
-        found.at_known.append(off / _at_known(image, where.picture))
+        found.at_known.append(off / _at_known(shot, where.picture))
 
 
-def _as_said(image: np.ndarray, picture: Picture, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _as_said(shot: np.ndarray, picture: Picture, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pulls of values (M,) and of the place (6,) by who takes the camera for what the scene says; NaN where that finds
     nothing."""
-    where = measure.locate(image, printed.as_said(picture))
-    told = measure.measure(image, where.picture)
+    where = measure.locate(shot, printed.as_said(picture))
+    told = measure.measure(shot, where.picture)
     place = difference(there[:6], where.placement) / np.sqrt(np.diag(where.covariance))
     return (told.value - told.nominal) / np.hypot(told.sigma, told.u_placed), place
 
 
-def _at_known(image: np.ndarray, picture: Picture) -> np.ndarray:
+def _at_known(shot: np.ndarray, picture: Picture) -> np.ndarray:
     """Standard deviations (M,) of the values by noise, were the place known."""
-    told = find(image[None], picture, measure.best_estimator(picture.scene))
+    told = find(shot[None], picture, measure.best_estimator(picture.scene))
     return np.sqrt(np.diag(values(told.seen, told.known.quantities, on_plane, told.errors).covariance[0]))
 
 
@@ -156,7 +158,7 @@ def is_as_told(pull: np.ndarray) -> bool:
     return bool(abs(pull.std() - 1) < SPREAD and abs(pull.mean()) < MEAN)
 
 
-def of_places(name: str, board: str, numbers: tuple[str, ...], seed: int, places: range) -> Pulls:
+def of_places(name: str, board: str, numbers: tuple[str, ...], seed: int, rendered: bool, places: range) -> Pulls:
     """Of one part's places of these numbers; each has a generator of its own."""
     found, k = Pulls(), list(placed_parts.CORNERS).index(name)
     with tempfile.TemporaryDirectory() as folder:
@@ -164,7 +166,7 @@ def of_places(name: str, board: str, numbers: tuple[str, ...], seed: int, places
         scene = printed.lenient(printed.estimated(scene, *numbers)) if numbers else scene
         picture = Picture.of(scene, placed_parts.SENSOR, placed_parts.LIGHT)
         for i in places:
-            one(picture, np.random.default_rng((seed, k, i)), found)
+            one(picture, np.random.default_rng((seed, k, i)), found, render.image if rendered else image)
         found.names, found.numbers = tuple(each.name for each in scene.quantities), numbers
     return found
 
@@ -175,6 +177,7 @@ def placements(
     only: Annotated[str, typer.Option(help="Parts whose names begin so.")] = "",
     board: Annotated[str, typer.Option(help="chessboard, dots or markers: they tell the place.")] = "",
     camera: Annotated[str, typer.Option(help="What is estimated of the camera: focal, or with a board focal,k1.")] = "",
+    rendered: Annotated[bool, typer.Option(help="Pictures by the renderer, not by the image model.")] = False,
     jobs: Annotated[int, typer.Option(help="Processes.")] = 1,
 ) -> None:
     """Three parts at 1000 random places: found, and place and values as well known as told; an hour of a processor."""
@@ -182,7 +185,7 @@ def placements(
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         for name in [each for each in placed_parts.CORNERS if each.startswith(only)]:
             shares = [range(at, places, 4 * jobs) for at in range(min(4 * jobs, places))]
-            found = sum(pool.map(partial(of_places, name, board, numbers, seed), shares), Pulls())
+            found = sum(pool.map(partial(of_places, name, board, numbers, seed, rendered), shares), Pulls())
             good &= summary(name, found)
             every.append(found)
     raise typer.Exit(0 if held(every) and good else 1)
