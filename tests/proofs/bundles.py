@@ -8,16 +8,16 @@ first with three rendered pictures of `bracket_station`, known and uncertain, wi
 there biases, by light between faces too, are those of other renders, taken off; means must be within 0.3 of the
 standard uncertainty of noise and correction together. Last `board_block`: block and board lie elsewhere in each set,
 the board's place beside the block, its pitch and the lens' focal length are drawn anew, of the sensors nothing is
-known. Controls that must fail: variances 1.3 times too large or too small; sensors taken for known that are not; each
-kind of the sensors' errors left out of what is unknown; the board's pitch taken for exact; the station's biases left
-on.
+known (``--rendered``: in rendered pictures). Controls that must fail: variances 1.3 times too large or too small;
+sensors taken for known that are not; each kind of the sensors' errors left out of what is unknown; the board's pitch
+taken for exact; the station's biases left on.
 """
 
 from __future__ import annotations
 
 import itertools
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -257,9 +257,9 @@ def board(estimated: tuple[str, ...] = ("focal",), pitch_sd: float = 0.002) -> S
     )
 
 
-def of_board(sets: int, seed: int) -> tuple[list[Row], list[str]]:
+def of_board(sets: int, seed: int, made_by: Callable[[Picture], np.ndarray] = image) -> tuple[list[Row], list[str]]:
     """Rows of a block beside a board by two and three sensors of which nothing is known, place, board and lens drawn
-    anew; and the pitch's name where it passes for exact."""
+    anew, in noise-free images that ``made_by`` makes; and the pitch's name where it passes for exact."""
     rng, made, rows, wrong = np.random.default_rng(seed), board(), [], []
     exact = [each.with_scene(board(pitch_sd=1e-9)) for each in _before_board(made)]
     for count in (2, 3):
@@ -273,7 +273,7 @@ def of_board(sets: int, seed: int) -> tuple[list[Row], list[str]]:
             shots = []
             for picture in _before_board(made)[:count]:
                 moved = _elsewhere(placed(picture.with_scene(true), place), *rng.normal(0, [0.5, 0.02, 0.02, 0.2]))
-                shots.append((render.expose(image(moved), true.noise, rng, 1)[0], picture))
+                shots.append((render.expose(made_by(moved), true.noise, rng, 1)[0], picture))
             told = measure.bundle(shots, "unknown")
             known = measure.bundle([(one, each) for (one, _), each in zip(shots, exact, strict=False)], "unknown")
             off.append((told.value - told.nominal) / told.u)
@@ -297,6 +297,7 @@ def bundles(
     sets: Annotated[int, typer.Option(help="Sets of sensors that are drawn anew.")] = 100,
     seed: Annotated[int, typer.Option()] = 1,
     smaller: Annotated[int, typer.Option(help="By what the station's pictures are smaller, each way.")] = 1,
+    rendered: Annotated[bool, typer.Option(help="Pictures of board_block by the renderer.")] = False,
     only: Annotated[
         str, typer.Option(help="exact: two parts in exact images; station: bracket_station; board: board_block.")
     ] = "",
@@ -311,7 +312,10 @@ def bundles(
                 found = of_part(scene, draws, sets, seeds)
                 rows, wrong, passed = rows + found[0], wrong + found[1], passed + found[2]
     if only in ("", "board"):
-        found, unseen = of_board(3 * sets, seed)  # of four rows fewer do not show a variance 1.3 times too large
+        made_by = render.image if rendered else image
+        found, unseen = of_board(
+            3 * sets, seed, made_by
+        )  # of four rows fewer do not show a variance 1.3 times too large
         rows, passed = rows + found, passed + unseen
     if only in ("", "station"):
         told = of_station(draws, seed, smaller)
