@@ -13,7 +13,8 @@ import planner
 from measure.boards.camera import CameraCalibration
 from measure.boards.chessboard import Board
 from measure.boards.next_pose import middle_of, next_board
-from scenes import InvalidInput, Picture
+from planner.budgeting.sources import LENS_MODE
+from scenes import InvalidInput, Picture, Scene
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Proposal:
 def propose(
     found: CameraCalibration, boards: Sequence[Board], square_size: float, picture: Picture, name: str
 ) -> Proposal:
-    """The proposal for a measurand of a picture whose scene takes the calibration's covariance.
+    """The proposal for a measurand of a picture whose scene takes what the calibration leaves open.
 
     Raises
     ------
@@ -74,11 +75,14 @@ def propose(
     names = [each.name for each in picture.scene.quantities]
     if name not in names:
         raise InvalidInput(f"--next must be one of {', '.join(names)}, got {name!r}")
-    budget = planner.budget(picture.with_scene(picture.scene.with_(uncertainty={"covariance": found.for_budget})))
-    slopes = dict(zip((each.name for each in budget.sources), budget.sensitivities[names.index(name)], strict=True))
-    gradient = np.array([slopes[each] for each in found.names])
-    told, now = next_board(found, boards, square_size, gradient), budget[name]
-    freed = gradient @ (found.covariance - told.covariance) @ gradient
+    budget = planner.budget(picture.with_scene(_as_calibrated(picture.scene, found)))
+    by_source = dict(zip((each.name for each in budget.sources), budget.sensitivities[names.index(name)], strict=True))
+    if found.is_splined:
+        slopes = np.array([by_source[f"{LENS_MODE} {number}"] for number in range(1, found.errors.shape[1] + 1)])
+    else:
+        slopes = found.errors.T @ [by_source[each] for each in found.names]
+    told, now = next_board(found, boards, square_size, slopes), budget[name]
+    freed = slopes @ slopes - told.variances[told.best]
     at = middle_of(told.pose, boards[0], square_size)
     image = found.model.seen(found.values, at[None])[0][0]
     normal = cv2.Rodrigues(told.pose[:3])[0][:, 2]
@@ -92,4 +96,13 @@ def propose(
         distance=float(np.linalg.norm(at)),
         tilt_deg=float(np.degrees(np.arccos(np.clip(abs(normal[2]), 0.0, 1.0)))),
         candidates=len(told.poses),
+    )
+
+
+def _as_calibrated(scene: Scene, found: CameraCalibration) -> Scene:
+    """The scene with what the calibration leaves open; of a splined lens with that lens, of which its errors are."""
+    if not found.is_splined:
+        return scene.with_(uncertainty={"covariance": found.for_budget})
+    return scene.with_(
+        camera={"lens": found.lens.spline}, uncertainty={"covariance": None, "lens_modes": found.lens_modes}
     )

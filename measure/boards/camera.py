@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 from measure.boards.adjustment import Adjusted, adjust, begin
 from measure.boards.chessboard import Board
 from measure.boards.eccentricity import centred
-from measure.boards.lens_modes import lens_modes
+from measure.boards.lens_modes import errors_of, lens_modes
 from measure.boards.parameters import SPLINED, CameraModel, Model, read_model, splined_control
 from measure.boards.splined import SplinedModel, fitted
 from measure.photo.lens import Intrinsics, SplinedIntrinsics
@@ -120,6 +120,11 @@ class CameraCalibration:
             raise InvalidInput(f"model must be one of coefficients for a covariance that scenes take, got {SPLINED}")
         even = (self.covariance + self.covariance.T) / 2
         return Covariance(names=self.names, matrix=tuple(tuple(map(float, row)) for row in even))
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Independent standard errors of the values, shape (k, m), a column each (`measure.boards.lens_modes`)."""
+        return errors_of(self)
 
     @property
     def lens_modes(self) -> tuple[LensMode, ...]:

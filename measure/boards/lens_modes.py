@@ -1,4 +1,5 @@
-"""What a calibration leaves open of a splined lens, as independent errors, those that move the image most first."""
+"""What a calibration leaves open of a camera as independent errors, of a splined lens those that move the image most
+first."""
 
 from __future__ import annotations
 
@@ -15,8 +16,6 @@ _LEAST = 1e-4  # px: an error that moves no place of the image by more is left o
 def lens_modes(camera: Calibrated) -> tuple[LensMode, ...]:
     """Of a calibrated camera with a splined lens, as a scene's ``uncertainty.lens_modes`` takes them.
 
-    Principal components of how the image of fixed rays moves, over a grid of the image.
-
     Raises
     ------
     InvalidInput
@@ -24,14 +23,25 @@ def lens_modes(camera: Calibrated) -> tuple[LensMode, ...]:
     """
     if not isinstance(camera.model, SplinedModel):
         raise InvalidInput("model must be splined for modes of its lens, got one of coefficients")
+    return tuple(_mode(camera.model, error) for error in errors_of(camera).T)
+
+
+def errors_of(camera: Calibrated) -> np.ndarray:
+    """Independent errors of a camera's values, shape (k, m), each as large as its standard uncertainty.
+
+    Together they have its covariance. Of a splined lens principal components of how the image of fixed rays moves, over
+    a grid of the image, those that move it at all.
+    """
+    root = _root(camera.covariance)
+    if not isinstance(camera.model, SplinedModel):
+        return root
     rays = rays_of(camera, grid_over(camera.image_shape, 0.0))
     is_recorded = np.isfinite(camera.model.lens(camera.values).bent(rays[:, :2] / rays[:, 2:])).all(1)
     by_values = camera.model.seen(camera.values, rays[is_recorded])[1]
-    root = _root(camera.covariance)
     axes = np.linalg.svd(by_values.reshape(-1, len(root)) @ root, full_matrices=False)[2]
     errors = root @ axes.T
     far = np.linalg.norm(by_values @ errors, axis=1).max(0)
-    return tuple(_mode(camera.model, error) for error in errors.T[far > _LEAST])
+    return errors[:, far > _LEAST]
 
 
 def _mode(model: SplinedModel, error: np.ndarray) -> LensMode:

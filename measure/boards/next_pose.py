@@ -1,7 +1,9 @@
 """Where to hold a board for the next photograph of a calibration, so that something is known best.
 
 A photograph more adds the Fisher information of its corners about the camera, less what its own pose takes of it: with
-J and K the whitened derivatives by camera and pose, J^T (1 - K K+) J. What is asked is a linear function of the camera.
+J and K the whitened derivatives by camera and pose, J^T (1 - K K+) J. What is asked is a linear function of the camera:
+with E the independent errors that the calibration leaves, and s what each does to the function, its variance is s^T s
+before and s^T (1 + E^T J^T (1 - K K+) J E)^-1 s after.
 """
 
 from __future__ import annotations
@@ -34,13 +36,10 @@ class NextBoard:
         Rotation vector (radians) and translation (unit of the squares) from the board to the camera, as OpenCV's.
     variances : ndarray, shape (N,)
         Of the function, by the camera, after each.
-    covariance : ndarray, shape (k, k)
-        Of the intrinsics after the best.
     """
 
     poses: np.ndarray
     variances: np.ndarray
-    covariance: np.ndarray
 
     @property
     def best(self) -> int:
@@ -53,9 +52,7 @@ class NextBoard:
         return self.poses[self.best]
 
 
-def next_board(
-    found: CameraCalibration, boards: Sequence[Board], square_size: float, gradient: np.ndarray
-) -> NextBoard:
+def next_board(found: CameraCalibration, boards: Sequence[Board], square_size: float, slopes: np.ndarray) -> NextBoard:
     """The pose, of a grid of those that the camera sees whole, whose photograph lowers a function's variance most.
 
     Its corners count as measured as the median of those that were, and the camera as it was found.
@@ -64,8 +61,8 @@ def next_board(
     ----------
     found : CameraCalibration
         Of ``boards``.
-    gradient : ndarray, shape (k,)
-        Derivatives of the function by ``found.values``.
+    slopes : ndarray, shape (m,)
+        What each of ``found.errors`` does to the function.
 
     Raises
     ------
@@ -79,10 +76,9 @@ def next_board(
         raise InvalidInput("board must be seen whole from some pose, got none where it is")
     sizes = [np.linalg.det(board.covariance[board.measured]) ** 0.25 for board in boards]
     sigma = np.sqrt(found.dispersion) * float(np.median(np.concatenate(sizes)))
-    known = np.linalg.inv(found.covariance)
-    told = [np.linalg.inv(known + information(found, places, pose, sigma)) for pose in poses]
-    variances = np.array([gradient @ each @ gradient for each in told])
-    return NextBoard(poses, variances, told[int(variances.argmin())])
+    errors, none = found.errors, np.eye(len(slopes))
+    told = [none + errors.T @ information(found, places, pose, sigma) @ errors for pose in poses]
+    return NextBoard(poses, np.array([slopes @ np.linalg.solve(each, slopes) for each in told]))
 
 
 def information(found: CameraCalibration, places: np.ndarray, pose: np.ndarray, sigma: float) -> np.ndarray:
@@ -110,7 +106,10 @@ def candidates(found: CameraCalibration, board: Board, square_size: float) -> np
         rotation = cv2.Rodrigues(axis)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, np.radians(roll)]))[0]
         there = nearer * away * np.array([x * width / lens.fx, y * height / lens.fy, 1.0])
         pose = np.concatenate([cv2.Rodrigues(rotation)[0].ravel(), there - rotation @ middle])
-        image = found.model.seen(found.values, outer @ rotation.T + pose[3:])[0]
+        points = outer @ rotation.T + pose[3:]
+        if found.is_splined and not np.isfinite(found.lens.spline.bent(points[:, :2] / points[:, 2:])).all():
+            continue  # where no board was seen nothing is recorded
+        image = found.model.seen(found.values, points)[0]
         if (image >= _MARGIN).all() and (image <= np.array([width, height]) - 1 - _MARGIN).all():
             poses.append(pose)
     return np.array(poses).reshape(-1, 6)

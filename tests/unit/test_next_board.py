@@ -9,9 +9,12 @@ import pytest
 import measure
 import scenes
 from measure.boards.next_pose import candidates, information, next_board
+from measure.boards.projections import rays_of
 from measure.boards.view import on_board
 from scenes import InvalidInput, Picture
 from tests.boards import SMALL, poses, told
+from tests.unit.test_splined import Wavy
+from tests.unit.test_splined import boards as wavy_boards
 from validation.next_board import propose
 
 SHAPE, SIGMA = SMALL.size[::-1], 0.01
@@ -39,7 +42,7 @@ def test_what_a_board_tells_of_a_camera_is_what_a_calibration_with_it_gains(firs
     seen, _, found = first
     for which in ("fx", "k1"):
         gradient = np.array([float(name == which) for name in found.names])
-        proposed = next_board(found, boards(seen, np.random.default_rng(1)), SMALL.square, gradient)
+        proposed = next_board(found, boards(seen, np.random.default_rng(1)), SMALL.square, found.errors.T @ gradient)
         order = np.argsort(proposed.variances)
         assert len(order) > 50
         left = []
@@ -73,7 +76,7 @@ def test_a_grid_of_markers_is_worth_what_is_told():
     given[0] = replace(given[0], status=("not_visible",) * 8 + given[0].status[8:])
     found = measure.calibrate_camera(given, rig.square, SHAPE, model="k1,k2,p1,p2")
     gradient = np.array([float(name == "fx") for name in found.names])
-    proposed = next_board(found, given, rig.square, gradient)
+    proposed = next_board(found, given, rig.square, found.errors.T @ gradient)
     now = measure.calibrate_camera([*given, of(proposed.pose)], rig.square, SHAPE, model="k1,k2,p1,p2")
     assert gradient @ now.covariance @ gradient == pytest.approx(proposed.variances[proposed.best], rel=0.1)
     for pose in proposed.poses[::20]:
@@ -126,3 +129,26 @@ def test_u_of_a_measurand_falls_as_told(first):
         propose(found, given, SMALL.square, picture, "none")
     with pytest.raises(InvalidInput, match="must determine a camera before another is proposed"):
         next_board(replace(found, covariance=np.full_like(found.covariance, np.inf)), given, 1.0, np.zeros(8))
+
+
+def test_what_a_board_tells_of_a_splined_lens_is_what_a_calibration_with_it_gains():
+    """Where a ray is recorded, by the board that is proposed and by the worst one. U of a measurand with that lens."""
+    seen = poses(SMALL, 12, np.random.default_rng(5), 420.0)
+    given = wavy_boards(Wavy(1.5), seen, np.random.default_rng(6))
+    found = measure.calibrate_camera(given, SMALL.square, SHAPE, "splined:6x5")
+    ray = rays_of(found, np.array([[90.0, 70.0]]))
+
+    def variance(camera):
+        by_values = camera.model.seen(camera.values, ray)[1][0, 0]
+        return by_values @ camera.covariance @ by_values
+
+    slopes = found.errors.T @ found.model.seen(found.values, ray)[1][0, 0]
+    assert slopes @ slopes == pytest.approx(variance(found), rel=1e-6)  # what moves no image is left out
+    proposed = next_board(found, given, SMALL.square, slopes)
+    for n in (proposed.best, int(proposed.variances.argmax())):
+        more = wavy_boards(Wavy(1.5), [*seen, proposed.poses[n]], np.random.default_rng(6))
+        now = variance(measure.calibrate_camera(more, SMALL.square, SHAPE, "splined:6x5"))
+        assert now == pytest.approx(proposed.variances[n], rel=0.03)  # at what each calibration finds: 0.004 found
+    assert proposed.variances.min() < 0.85 * variance(found) < 0.85 * proposed.variances.max() / 0.95
+    told_ = propose(found, given, SMALL.square, Picture.of(scenes.load("task1"), (30, 135), (15, 315)), "distance")
+    assert 0.5 * told_.U < told_.U_then < 0.95 * told_.U

@@ -98,8 +98,6 @@ def calibrate_camera_command(given: Options) -> None:
     from validation.report import camera_table
 
     splined = splined_control(given.model) is not None
-    if splined and given.following is not None:
-        raise InvalidInput(f"--next must be used without --model {given.model}, got {given.following!r}")
     if not splined:
         read_model(given.model)
     scene, beside = given.scene, given.output and _beside(given.output, splined)
