@@ -111,7 +111,8 @@ def plan_views(
         if share is not None:
             raise InvalidInput(f"vary must be left out with share, got {','.join(vary)}")
     if not scene.placement.is_known:
-        raise InvalidInput(f"placement.from must be known for several pictures, got {scene.placement.source!r}")
+        source = scene.placement.source
+        raise InvalidInput(f"placement.from must be known for pictures that are not adjusted together, got {source!r}")
     report, limits = report or (lambda *_: None), (constraints or Constraints()).on_side_of(scene)
     problem = SearchProblem(scene, model, aim, limits)
     fast = has_bound(scene, model) and share is None
