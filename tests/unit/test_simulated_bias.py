@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import measure
+import planner
 import scenes
 from imaging.geometry.projection import project
 from imaging.models.texture import texture_errors
@@ -295,6 +296,26 @@ def test_the_place_of_a_light_moves_an_arrangement_by_what_its_images_show():
         found = simulation.simulated(Picture.of(scene, sensor, light), Method("arrangement"))
         assert found.status == ("ok",)
         assert found.sources["light_place"][0] < 0.1 * found.sigma[0]
+
+
+@pytest.mark.parametrize(("off", "rendered"), [(0.05, 0), (0.2, 7)])
+def test_lights_elsewhere_are_drawn_where_the_image_model_draws_the_render(small_task1, off, rendered, monkeypatch):
+    """Parts of a pixel's noise that they differ by: half of what is allowed, and twice as much."""
+    picture, shown = Picture.of(small_task1, *POSES), []
+
+    def image(how, other, effects, seed):
+        shown.append(other)
+        return planner.image(other)
+
+    monkeypatch.setattr(How, "_rendered", image)
+    here = planner.image(picture)
+    first = here + off * small_task1.noise.sigma * np.random.default_rng(3).choice([-1, 1], here.shape)
+    images = imagery.completed(picture, (first,), (), How().by(Method("arrangement")))
+    assert len(shown) == rendered
+    others = [planner.image(each) - here for each in inputs.with_lights_moved(picture, math.sqrt(3.0))]
+    for made, other in zip(images.changed["light_place"][::2], others, strict=True):
+        assert np.abs(other).max() > 0.1
+        assert made - first == pytest.approx(other / math.sqrt(3.0), abs=0.1 * np.abs(other).max())  # of first order
 
 
 class _Rendered(How):

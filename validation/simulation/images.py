@@ -6,7 +6,8 @@ step more does more than one less. By how much both lie off the straight line co
 square is one on the mean, in standard uncertainties. In images above a megapixel, where that takes long, what one
 material does is told by the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered
 so, too, both ways and as far as they may stand, for a shadow may reach an edge from there alone; in large images their
-direct light. Of plain scenes the closed form of the bias tells what lights do.
+direct light. Of plain scenes the closed form of the bias tells what lights do, or images of the image model do, where
+that draws the render itself.
 Renders that are compared have the same rays, one by one, or their difference would be noise; and what makes a picture
 brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
 """
@@ -20,9 +21,13 @@ from functools import cache, partial
 
 import numpy as np
 
+from imaging.blurred.whole import image as drawn
+from imaging.blurred.whole import is_drawable
+from imaging.colour import seen
 from measure import Images
 from render.build import MANY_WAYS
 from render.large import LARGE
+from render.surroundings import near_required
 from scenes import Picture
 from validation.simulation.dimmed import of_one_surface
 from validation.simulation.how import BETWEEN, How, is_below
@@ -40,6 +45,7 @@ from validation.simulation.inputs import (
 _LIMIT = math.sqrt(3.0)  # standard deviations: the end of a uniform distribution, where a shadow may reach an edge
 _SETS = 4  # of rays that tell what changes a bias that is not known well enough
 _OVERALL = {"supersample": 1, "samples": 1, "edge_samples": 4, "random_samples": 16}
+_DRAWN = 0.1  # of a pixel's noise: nearer to a render, the image model tells what a light elsewhere does
 _LEVELS = 64  # random samples of the image that a picture is compared with
 
 
@@ -67,10 +73,19 @@ def completed(
         lines = {LIGHT: lines_by_lights(picture)}
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
-        made = whole if is_below(picture, LARGE) else direct
+        made = drawn if _is_drawn(picture, first) else whole if is_below(picture, LARGE) else direct
         changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
     changed = {name: some for name, some in changed.items() if some}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
+
+
+def _is_drawn(picture: Picture, render: np.ndarray) -> bool:
+    """Whether the image model draws a render, near what is measured, far below the noise of a pixel, rms."""
+    if not is_drawable(picture.scene):
+        return False
+    near = near_required(picture, (slice(0, render.shape[0]), slice(0, render.shape[1])), 1)
+    squares = np.square(drawn(picture) - render) / seen(picture.scene.noise, render).noise_variance
+    return bool(near.any()) and float(squares[near].mean()) < _DRAWN**2
 
 
 def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
@@ -125,10 +140,10 @@ def _both_ways(
 ) -> tuple[np.ndarray, ...]:
     """For each input the first render with what it does on the straight line, and with what both ways lie off it."""
     ways = [each for pair in _pairs(others, picture, times) for each in pair]
-    seen = iter(_steps(first, made, ways, picture))
+    found = iter(_steps(first, made, ways, picture))
     return tuple(
         _added(first, part, 2 * times)
-        for one, other in zip(seen, seen, strict=True)
+        for one, other in zip(found, found, strict=True)
         for part in (one - other, one + other - 2 * first)
     )
 
