@@ -73,18 +73,20 @@ def completed(
         lines = {LIGHT: lines_by_lights(picture)}
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
-        made = drawn if _is_drawn(picture, first) else whole if is_below(picture, LARGE) else direct
+        drawing = cache(drawn)
+        rendered = whole if is_below(picture, LARGE) else direct
+        made = drawing if _is_drawn(picture, first, drawing) else rendered
         changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
     changed = {name: some for name, some in changed.items() if some}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
 
 
-def _is_drawn(picture: Picture, render: np.ndarray) -> bool:
+def _is_drawn(picture: Picture, render: np.ndarray, drawing: Callable[[Picture], np.ndarray]) -> bool:
     """Whether the image model draws a render, near what is measured, far below the noise of a pixel, rms."""
     if not is_drawable(picture.scene):
         return False
     near = near_required(picture, (slice(0, render.shape[0]), slice(0, render.shape[1])), 1)
-    squares = np.square(drawn(picture) - render) / seen(picture.scene.noise, render).noise_variance
+    squares = np.square(drawing(picture) - render) / seen(picture.scene.noise, render).noise_variance
     return bool(near.any()) and float(squares[near].mean()) < _DRAWN**2
 
 
