@@ -203,8 +203,8 @@ def _links(shape: Chains, free: np.ndarray) -> np.ndarray:
     pairs = pairs_of(face)
     one, two = chain[pairs].T
     here = face[pairs[:, 0]]
-    width = shape.areas[here] / np.maximum(shape.length[one], shape.length[two])
-    beyond = (shape.areas[other] / shape.length[chain])[pairs].max(1)
+    width = shape.areas[here] / np.maximum(shape.border[one], shape.border[two])
+    beyond = (shape.areas[other] / shape.border[chain])[pairs].max(1)
     alike = (shape.convex[one] == shape.convex[two]) | (np.maximum(shape.bend[one], shape.bend[two]) <= _SLIGHT)
     return np.column_stack([one, two, here])[alike & (width <= _WIDER * beyond)]
 
@@ -297,7 +297,7 @@ def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
 
     They are about as wide as the one before, and the surface bends as before: towards a plane it does half as much.
     """
-    width = shape.areas[shape.faces] / shape.length[:, None]
+    width = shape.areas[shape.faces] / shape.border[:, None]
     curvature = shape.bend / width.sum(1)
     found, bent = facet.copy(), smooth & (shape.bend <= _SLIGHT)
     largest = np.zeros(len(shape.areas))
