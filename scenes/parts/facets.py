@@ -18,7 +18,7 @@ import numpy as np
 
 from scenes.parts.chains import Chain, Chains, components, pairs_of
 from scenes.parts.cones import chords
-from scenes.parts.curves import LONGER, curved, meetings, turns_at
+from scenes.parts.curves import LONGER, curved, meetings, turning, turns_at
 from scenes.parts.rims import Rim
 
 _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
@@ -94,7 +94,7 @@ def facets(
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, components(len(normals), joins), -1)
-    curves = edging | curved(shape, region, ~smooth & ~edging)
+    curves = edging | turning(shape, region, smooth) | curved(shape, region, ~smooth & ~edging)
     unsure = _unsure(shape, facet)
     within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
     beside = _filled(shape, region, within)
