@@ -12,7 +12,7 @@ from heapq import heappop, heappush
 
 import numpy as np
 
-from scenes.parts.chains import SINGLE, Chains, components
+from scenes.parts.chains import SINGLE, Chains
 from scenes.parts.surfaces import axes_beside
 
 _SIDES = 4  # of a facet, at most: those of more are planes that a surface continues
@@ -146,25 +146,27 @@ def chords(
         Chains inside of curved surfaces, and those that may be straight edges.
     """
     small = np.bincount(shape.faces.ravel(), minlength=len(region)) <= _SIDES
-    of = _beside_facets(shape, region, smooth, small)
+    of = _beside_facets(shape, region, smooth)
     own = of[shape.faces]
     likely = asked & ((own >= 0) & small[shape.faces]).any(1)
+    across = _across(shape, smooth & (region[shape.faces] >= 0).any(1) & ((region >= 0) | small)[shape.faces].all(1))
     found = np.zeros(len(asked), bool)
     single = SINGLE * float(np.abs(vertices).max())
+
+    def told_by(faces: np.ndarray, ends: np.ndarray) -> np.ndarray | None:
+        """Which lines (n, 2, 3) are chords of the surface of some faces; None where they are of none."""
+        corners = vertices[np.unique(shape.ends[np.isin(shape.faces, faces).any(1)])]
+        return _beside(corners, normals[faces], ends, single)
+
     for number in np.setdiff1d(own[likely], [-1]):
-        inside = ((own == number) & (region[shape.faces] >= 0)).any(1)
-        corners = vertices[np.unique(shape.ends[inside])]
         rows = np.flatnonzero(likely & ((own == number) & small[shape.faces]).any(1))
         ends = vertices[shape.ends[rows]]
-        told = _beside(corners, normals[(of == number) & (region >= 0)], ends, single)
+        told = told_by(np.flatnonzero(region == number), ends)
         if told is not None:
             found[rows] |= told
             continue
-        across = _across(shape, smooth & (own == number).all(1))
         for row, side in zip(*np.nonzero((own[rows] == number) & small[shape.faces[rows]]), strict=True):
-            faces = _nearest(across, int(shape.faces[rows[row], side]))
-            corners = vertices[np.unique(shape.ends[np.isin(shape.faces, faces).any(1)])]
-            told = _beside(corners, normals[faces], ends[row : row + 1], single)
+            told = told_by(np.array(_nearest(across, int(shape.faces[rows[row], side]))), ends[row : row + 1])
             found[rows[row]] |= told is not None and bool(told[0])
     return found
 
@@ -202,17 +204,11 @@ def _nearest(across: dict[int, list[tuple[float, int]]], first: int) -> list[int
     return found
 
 
-def _beside_facets(shape: Chains, region: np.ndarray, smooth: np.ndarray, small: np.ndarray) -> np.ndarray:
-    """Numbers of the surfaces of facets, and of other faces that continue them smoothly; int, shape (F,), -1 of others.
-
-    Surfaces that a small such face joins are one: it is a facet too wide to be told.
-    """
-    facet = region >= 0
-    of_facets = smooth & facet[shape.faces].any(1)
-    group = components(len(region), shape.faces[of_facets & (facet | small)[shape.faces].all(1)])
-    found = np.where(facet, group, -1)
+def _beside_facets(shape: Chains, region: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """The same numbers, and those of the surfaces that other faces continue smoothly."""
+    found = region.copy()
     for side in (0, 1):
-        here, other = shape.faces[of_facets, side], shape.faces[of_facets, 1 - side]
-        rows = ~facet[here] & facet[other]
-        found[here[rows]] = group[other[rows]]
+        here, other = shape.faces[smooth, side], shape.faces[smooth, 1 - side]
+        rows = (region[here] < 0) & (region[other] >= 0)
+        found[here[rows]] = region[other[rows]]
     return found
