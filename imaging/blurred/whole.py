@@ -66,6 +66,11 @@ def signal_at(pictures: Pictures, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return model.image(model.start())
 
 
+def is_drawable(scene: Scene) -> bool:
+    """Whether `image` knows such scenes."""
+    return is_plain(scene) and not scene.textures
+
+
 def check_drawable(scene: Scene) -> None:
     """See that `image` knows such scenes.
 

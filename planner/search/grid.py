@@ -6,10 +6,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from imaging.geometry.projection import direction
 from planner.constraints import WHOLE, Constraints
@@ -46,6 +45,9 @@ def as_array(lights: Pose | tuple[Pose, ...]) -> np.ndarray:
     return np.array([list(pose) for pose in several(lights)], float).ravel()
 
 
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
 T = TypeVar("T")
 APART = 15.0  # degrees between two sensors, or two lights, of clearly different settings
 _NEIGHBOUR = 1.6  # steps; reaches the ring's next points and those beside them on the rings above and below
@@ -72,6 +74,8 @@ class Directions(ABC):
 
     @cached_property
     def _tree(self) -> KDTree:
+        from scipy.spatial import KDTree  # slow to load, which a prediction does not need
+
         return KDTree(self.directions)
 
     def neighbours(self, index: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -49,10 +50,16 @@ class Chains:
         unsure = 2 * SINGLE * float(np.abs(vertices).max())
         return cls(ends, faces, convex, along, length, bend, areas, unsure)
 
+    @cached_property
+    def border(self) -> np.ndarray:
+        """How long the two faces meet in all, shape (C,): holes, and corners not quite in line, divide that."""
+        _, both = np.unique(np.sort(self.faces, 1) @ [len(self.areas), 1], return_inverse=True)
+        return np.bincount(both, self.length)[both]
+
     @property
     def height(self) -> np.ndarray:
         """Of a curve over its chords (sagitta), were each chain a bend of one, shape (C,)."""
-        return self.bend * self.areas[self.faces].min(1) / self.length / 8
+        return self.bend * self.areas[self.faces].min(1) / self.border / 8
 
     @property
     def certain(self) -> np.ndarray:

@@ -149,22 +149,24 @@ def chords(
     of = _beside_facets(shape, region, smooth)
     own = of[shape.faces]
     likely = asked & ((own >= 0) & small[shape.faces]).any(1)
+    across = _across(shape, smooth & (region[shape.faces] >= 0).any(1) & ((region >= 0) | small)[shape.faces].all(1))
     found = np.zeros(len(asked), bool)
     single = SINGLE * float(np.abs(vertices).max())
+
+    def told_by(faces: np.ndarray, ends: np.ndarray) -> np.ndarray | None:
+        """Which lines (n, 2, 3) are chords of the surface of some faces; None where they are of none."""
+        corners = vertices[np.unique(shape.ends[np.isin(shape.faces, faces).any(1)])]
+        return _beside(corners, normals[faces], ends, single)
+
     for number in np.setdiff1d(own[likely], [-1]):
-        inside = (region[shape.faces] == number).any(1)
-        corners = vertices[np.unique(shape.ends[inside])]
         rows = np.flatnonzero(likely & ((own == number) & small[shape.faces]).any(1))
         ends = vertices[shape.ends[rows]]
-        told = _beside(corners, normals[region == number], ends, single)
+        told = told_by(np.flatnonzero(region == number), ends)
         if told is not None:
             found[rows] |= told
             continue
-        across = _across(shape, smooth & (own == number).all(1))
         for row, side in zip(*np.nonzero((own[rows] == number) & small[shape.faces[rows]]), strict=True):
-            faces = _nearest(across, int(shape.faces[rows[row], side]))
-            corners = vertices[np.unique(shape.ends[np.isin(shape.faces, faces).any(1)])]
-            told = _beside(corners, normals[faces], ends[row : row + 1], single)
+            told = told_by(np.array(_nearest(across, int(shape.faces[rows[row], side]))), ends[row : row + 1])
             found[rows[row]] |= told is not None and bool(told[0])
     return found
 

@@ -23,8 +23,7 @@ def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
     """
     pairs, ends, alone = meetings(shape, open_)
     cosine, turn, straight = turns_at(shape, pairs, ends)
-    sides = np.sort(np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces), 1)
-    alike = (sides[pairs[:, 0]] == sides[pairs[:, 1]]).all(1) & (region[shape.faces[pairs[:, 0]]] >= 0).any(1)
+    alike = _alike(shape, region, pairs)
     run = components(len(shape.bend), pairs[alike & straight])
     length = np.bincount(run, shape.length)[run][pairs]
     turns = (cosine >= _CURVE) & ~straight
@@ -43,6 +42,28 @@ def curved(shape: Chains, region: np.ndarray, open_: np.ndarray) -> np.ndarray:
         rows = turns & ((alike & curved[:, k]) | alone) & (length[:, k] <= most * length[:, 1 - k])
         found[pairs[rows, k]] = True
     return np.isin(run, run[found]) & open_
+
+
+def turning(shape: Chains, region: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+    """Which of the other chains go on as smooth ones that turn a little, between the same surfaces; bool, shape (C,).
+
+    Where a curved edge begins the surfaces on its sides may bend little; its last pieces are no straight edges.
+    """
+    between = ~smooth | (region[shape.faces[:, 0]] != region[shape.faces[:, 1]])
+    pairs, ends, _ = meetings(shape, between)
+    pairs, ends = (each[_alike(shape, region, pairs)] for each in (pairs, ends))
+    cosine, _, straight = turns_at(shape, pairs, ends)
+    found = np.zeros(len(shape.bend), bool)
+    for here, other in (pairs.T, pairs.T[::-1]):
+        near = shape.length[here] <= LONGER * shape.length[other]
+        found[here[~smooth[here] & smooth[other] & ~straight & (cosine >= _CURVE) & near]] = True
+    return found
+
+
+def _alike(shape: Chains, region: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Which pairs (n, 2) of chains lie between the same two surfaces, of which one is curved; bool, shape (n,)."""
+    sides = np.sort(np.where(region[shape.faces] >= 0, region[shape.faces], -2 - shape.faces), 1)
+    return (sides[pairs[:, 0]] == sides[pairs[:, 1]]).all(1) & (region[shape.faces[pairs[:, 0]]] >= 0).any(1)
 
 
 def turns_at(shape: Chains, pairs: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from scenes.parts.chains import Chain, Chains, components, pairs_of
 from scenes.parts.cones import chords
-from scenes.parts.curves import LONGER, curved, meetings, turns_at
+from scenes.parts.curves import LONGER, curved, meetings, turning, turns_at
 from scenes.parts.rims import Rim
 
 _BEND = np.radians(31)  # a polygon of at least 12 sides is a circle
@@ -94,7 +94,7 @@ def facets(
     facet = _last(shape, facet, smooth)
     joins = shape.faces[smooth & facet[shape.faces].all(1)]
     region = np.where(facet, components(len(normals), joins), -1)
-    curves = edging | curved(shape, region, ~smooth & ~edging)
+    curves = edging | turning(shape, region, smooth) | curved(shape, region, ~smooth & ~edging)
     unsure = _unsure(shape, facet)
     within = (facet | unsure)[shape.faces].all(1) & unsure[shape.faces].any(1)
     beside = _filled(shape, region, within)
@@ -203,8 +203,8 @@ def _links(shape: Chains, free: np.ndarray) -> np.ndarray:
     pairs = pairs_of(face)
     one, two = chain[pairs].T
     here = face[pairs[:, 0]]
-    width = shape.areas[here] / np.maximum(shape.length[one], shape.length[two])
-    beyond = (shape.areas[other] / shape.length[chain])[pairs].max(1)
+    width = shape.areas[here] / np.maximum(shape.border[one], shape.border[two])
+    beyond = (shape.areas[other] / shape.border[chain])[pairs].max(1)
     alike = (shape.convex[one] == shape.convex[two]) | (np.maximum(shape.bend[one], shape.bend[two]) <= _SLIGHT)
     return np.column_stack([one, two, here])[alike & (width <= _WIDER * beyond)]
 
@@ -297,7 +297,7 @@ def _last(shape: Chains, facet: np.ndarray, smooth: np.ndarray) -> np.ndarray:
 
     They are about as wide as the one before, and the surface bends as before: towards a plane it does half as much.
     """
-    width = shape.areas[shape.faces] / shape.length[:, None]
+    width = shape.areas[shape.faces] / shape.border[:, None]
     curvature = shape.bend / width.sum(1)
     found, bent = facet.copy(), smooth & (shape.bend <= _SLIGHT)
     largest = np.zeros(len(shape.areas))

@@ -1,6 +1,7 @@
 """STEP and STL files of the same parts: do they offer the same straight edges and circles, and only those that are?
 
-What is there is asked of OpenCASCADE's own edges and faces (`tests.cad_edges`), by none of the program's code.
+What is there is asked of OpenCASCADE's own edges and faces (`tests.cad_edges`), by none of the program's code; so is
+whether both files are of the same surfaces at all (`tests.cad_faces`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import trimesh
 import typer
 from scipy.spatial import KDTree
 
@@ -23,6 +25,7 @@ from scenes.parts import mesh, step
 from scenes.parts.solid import Solid
 from scenes.status import is_trusted
 from tests.cad_edges import SAME, Sharp, sharp_edges
+from tests.cad_faces import distances
 from validation import new_scene
 
 SIGMA = 0.01  # of a standard deviation
@@ -146,10 +149,14 @@ def _shifts(ends: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
 
 @dataclass(frozen=True)
 class Pair:
-    """What both files of a part offer; ``share`` of the corners of its edges are where the mesh has one."""
+    """What both files of a part offer; ``share`` of the corners of its edges are where the mesh has one.
+
+    ``apart`` is how far the farthest corner of the mesh is off the faces of the STEP file, mm.
+    """
 
     name: str
     share: float
+    apart: float
     placed: str
     step_lines: Match
     step_circles: Match
@@ -161,8 +168,14 @@ class Pair:
         """Whether the mesh is of this revision of the part."""
         return self.share >= _SAME_PART  # margin: a limit, no tolerance
 
+    @property
+    def differ(self) -> bool:
+        """Whether the files' surfaces are not the same."""
+        return self.apart > SAME
+
     def __str__(self) -> str:
         note = self.placed if self.same else f"{self.placed}; ANOTHER REVISION, {self.share:.0%} of the corners"
+        note += f"; FILES DIFFER, surfaces by {self.apart:.4f} mm" if self.differ else ""
         return (
             f"{self.name:<26}STEP lines {self.step_lines}; circles {self.step_circles} | "
             f"STL lines {self.lines}; circles {self.circles}{note}"
@@ -174,13 +187,15 @@ def compared(exact: Path, tessellated: Path) -> Pair:
     there = sharp_edges(exact)
     lines, circles = offered(step.read(exact).solid)
     solid = mesh.read(tessellated)
-    turn, shift, share = moved(there, solid.triangles.reshape(-1, 3))
+    corners = np.unique(np.asarray(trimesh.load_mesh(tessellated, process=False).vertices), axis=0)
+    turn, shift, share = moved(there, corners)
     there_circles = np.concatenate([there.circles[:, :3] @ turn.T + shift, there.circles[:, 3:]], 1)
     found = offered(solid)
     placed = "" if np.array_equal(turn, np.eye(3)) and not shift.any() else " (elsewhere)"
     return Pair(
         exact.stem,
         share,
+        float(distances(exact, (corners - shift) @ turn).max()),
         placed,
         compared_lines(there, np.eye(3), np.zeros(3), lines),
         matched(there.circles, circles),
@@ -292,7 +307,7 @@ def pairs(
 
 
 def _counted(pair: Pair) -> Counter[str]:
-    found = Counter({"pairs": 1, "same": int(pair.same)})
+    found = Counter({"pairs": 1, "same": int(pair.same), "differ": int(pair.differ)})
     for name in ("step_lines", "step_circles", "lines", "circles"):
         match = getattr(pair, name)
         if pair.same or name.startswith("step"):
@@ -302,7 +317,8 @@ def _counted(pair: Pair) -> Counter[str]:
 
 
 def _total(totals: Counter[str]) -> str:
-    lines = [f"{totals['pairs']} pairs, {totals['same']} of the same revision, {totals['refused']} refused"]
+    told = f"{totals['pairs']} pairs, {totals['same']} of the same revision, {totals['refused']} refused"
+    lines = [f"{told}; surfaces of {totals['differ']} differ by more than {SAME:g} mm"]
     for name in ("step_lines", "step_circles", "lines", "circles"):
         counts = [totals[f"{name} {key}"] for key in ("matched", "there", "false", "part")]
         told = name.replace("step_", "STEP ") if name.startswith("step") else f"STL {name}"

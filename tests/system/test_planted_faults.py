@@ -160,7 +160,7 @@ def _free(places, points, triangles):
 
 def test_forbidden_regions_by_great_circles(task1):
     """Haversines of the poses that a plan's constraints let pass and of those they do not."""
-    poses = planner.search.grid.ViewingSpace(5.0, (0.0, 90.0)).poses
+    poses = planner.ViewingSpace(5.0, (0.0, 90.0)).poses
     regions = ((30.0, 20.0, 25.0), (70.0, 350.0, 15.0))
     limits = planner.Constraints(forbidden_sensor=regions, forbidden_light=regions[:1], light_polar_deg=(10, 80))
     away = [2 * np.degrees(np.arcsin(np.sqrt(_haversine(poses, polar, azimuth)))) for polar, azimuth, _ in regions]

@@ -182,6 +182,26 @@ def test_chords_are_told_by_the_facets_next_to_them_where_a_surface_goes_on_as_a
     assert found.tolist() == [False] * count + [True] * count + [False]
 
 
+@pytest.mark.parametrize(("sides", "is_chord"), [(4, True), (5, False)])
+def test_facets_on_both_sides_of_one_that_is_too_wide_tell_its_chord(sides, is_chord):
+    """Two of a cone, one three times as wide and two more; a plane of five sides would be none of its facets."""
+    turn = np.array([0.0, 0.1, 0.2, 0.5, 0.6, 0.7])
+    outward = np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
+    vertices = np.concatenate([5 * outward, 6 * outward + [0, 0, 3.0]])
+    middle = (turn[1:] + turn[:-1]) / 2
+    normals = np.stack([3 * np.cos(middle), 3 * np.sin(middle), 0 * middle - 1], -1) / np.sqrt(10)
+    normals = np.concatenate([normals, [[0.0, 0, -1], [1, 0, 0]]])
+    rulings = [((i + 1, i + 7), (i, i + 1), True) for i in range(4)]
+    borders = [((i, i + 1), (i, 5), True) for i in range(5)]
+    others = [((8, 9), (2, 6), True)] * (sides - 3)
+    shape = Chains.of(vertices, rulings + borders + others, normals, np.full(7, 1.5))
+    number = np.arange(len(shape.ends))
+    found = cones.chords(
+        vertices, shape, normals, np.array([0, 0, -1, 1, 1, -1, -1]), number < 4, (number >= 4) & (number < 9)
+    )
+    assert found[6] == is_chord
+
+
 def test_pieces_are_joined_between_the_same_surfaces_alone():
     """Along x: two pieces of one region, then one of another, then one that turns away."""
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [4, 0, 0], [5, 0.01, 0]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenes.parts.chains import Chains
-from scenes.parts.curves import curved
+from scenes.parts.curves import curved, turning
 from scenes.parts.facets import _along_lines
 
 ARC = [1.0, 1.1, 0.9, 1.0]  # lengths of pieces that turn by 6 degrees
@@ -98,3 +98,31 @@ def test_what_continues_a_curved_edge_in_a_line_is_a_piece_of_it_up_to_where_oth
     curves = np.array([True, True, False] + [False] * len(others))
     assert _along_lines(shape, curves, np.ones(len(chains), bool)).sum() == found
     assert not _along_lines(shape, curves, np.arange(len(chains)) != 2)[2]  # a smooth one is none
+
+
+@pytest.mark.parametrize(
+    ("turn", "length", "wall", "found"),
+    [
+        (6.0, 1.0, 0, True),
+        (0.0, 1.0, 0, False),
+        (59.0, 1.0, 0, True),
+        (61.0, 1.0, 0, False),
+        (6.0, 3.9, 0, True),
+        (6.0, 4.1, 0, False),
+        (6.0, 1.0, 5, False),
+        (6.0, 1.0, -1, False),
+    ],
+)
+def test_a_piece_that_goes_on_as_smooth_ones_that_turn_is_none_of_a_straight_edge(turn, length, wall, found):
+    """Two smooth pieces between a plane and facets of surface 0, and one that is sharp: not in their line, not long.
+
+    Nor beside another surface or plane; a smooth edge between two facets of the surface says nothing.
+    """
+    way = np.radians(np.cumsum([0.0, 6.0, turn]))
+    steps = np.stack([np.cos(way), np.sin(way), 0 * way], -1) * np.array([1.0, 1.0, length])[:, None]
+    vertices = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, 0), [[2.0, -1, 1]]])
+    chains = [((i, i + 1), (0, i + 1), True) for i in range(3)] + [((2, 4), (2, 3), True)]
+    shape = Chains.of(vertices, chains, np.tile([0.0, 0, 1], (4, 1)), np.ones(4))
+    region, smooth = np.array([-1, 0, 0, wall]), np.array([True, True, False, True])
+    assert turning(shape, region, smooth).tolist() == [False, False, found, False]
+    assert not turning(shape, region, np.arange(4) == 3).any()

@@ -226,6 +226,18 @@ def test_two_bends_that_are_much_higher_than_their_surface_are_edges(bend, is_ro
     assert (len(set(some.region[1:18].tolist())) == 1) is is_round
 
 
+@pytest.mark.parametrize("short", [1e-3, 0.1])
+def test_a_border_in_two_pieces_is_as_long_as_both(short):
+    """20 degrees between faces of 1, whose borders are a piece of 4 and a short one, beside 5 degrees on the same."""
+    vertices, chains, normals, areas = strip([9, 1, 1, 1, 1, 90, *[1.0] * 4, 90], bends([5.0] * 5, [20.0] * 5))
+    vertices = np.concatenate([vertices, vertices[10:] + [short, 0, 0]])
+    chains += [((10 + i, 20 + i), *chains[i][1:]) for i in range(5, 10)]
+    some = facets.facets(vertices, chains, normals, areas, ())
+    assert (some.region >= 0).tolist() == [False, *[True] * 4, False, *[True] * 4, False]
+    border = Chains.of(vertices, chains, normals, areas).border
+    assert border == pytest.approx([4.0] * 5 + [4 + short] * 10)
+
+
 @pytest.mark.parametrize(("bend", "is_round"), [(10.8, True), (11.2, False)])
 def test_one_bend_that_stands_out_by_ten_times_is_an_edge(bend, is_round):
     """However little it is: 1.1 degrees before and behind."""

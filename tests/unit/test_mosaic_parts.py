@@ -1,5 +1,6 @@
 """Tiles that are rendered again, put together from a renderer that knows each pixel's value."""
 
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,7 +21,7 @@ def tiles(monkeypatch):
     """The corners in the whole frame, with the side, of every tile that was asked for."""
     asked = []
 
-    def side_by_side(mitsuba, view, corners, side, samples):
+    def side_by_side(mitsuba, view, corners, side, samples, placed):
         asked.extend((y, x, side) for y, x in corners)
         return corners, side
 
@@ -74,3 +75,25 @@ def test_side_of_the_least_time():
                 assert found in sides
                 assert time(marked, found, samples, sensor) == min(time(marked, s, samples, sensor) for s in sides)
     assert _side(alone, 16, 0, 64) == min(module._SIDES)
+
+
+def test_the_next_sensor_is_made_while_rays_are_traced_and_never_two_renders_at_once():
+    """A render waits until the sensor after its own is there; the last has none after it. A mistake ends all."""
+    there, running, most = [threading.Event() for _ in range(5)], [], []
+
+    def sensors():
+        for number, event in enumerate(there):
+            event.set()
+            yield (number,)
+
+    def traced(number):
+        running.append(number)
+        most.append(len(running))
+        waited = there[min(number + 1, 4)].wait(timeout=10)
+        running.pop()
+        return number if waited else None
+
+    assert list(module._meanwhile(traced, sensors())) == [0, 1, 2, 3, 4]
+    assert most == [1] * 5
+    with pytest.raises(ZeroDivisionError):
+        list(module._meanwhile(lambda number: 1 / (3 - number), sensors()))

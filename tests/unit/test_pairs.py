@@ -1,5 +1,6 @@
 """STEP and STL of one part: the oracle of edges on parts whose edges are counted by hand, and both files' features."""
 
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -10,6 +11,7 @@ from scenes import Measurand
 from scenes.parts import mesh, step
 from scenes.parts.recognised import cylinders
 from tests.cad_edges import Sharp, sharp_edges
+from tests.cad_faces import distances
 from tests.proofs import pairs
 
 kernel = pytest.mark.skipif(find_spec("OCP") is None, reason="needs OpenCASCADE: pip install 'ice-vision[step]'")
@@ -89,9 +91,32 @@ def test_both_files_offer_what_there_is(tmp_path):
         assert (match.matched, len(match.false)) == (2, 0)
     assert pair.same
     assert pair.placed == ""
+    assert pair.apart < 1e-5  # mm: single precision
+    assert "DIFFER" not in str(pair)
+    assert "FILES DIFFER, surfaces by 0.0123 mm" in str(replace(pair, apart=0.0123))
     solid = mesh.read(tmp_path / "part.stl")
     assert sum(solid.plane) == sum(part.solid.plane) == 7
     assert 4.0 in [round(each.surface.radius, 4) for each in cylinders(solid)]
+
+
+@kernel
+def test_how_far_places_are_off_the_part(tmp_path):
+    """Off the fillet along its radius, off the bore's wall, on the plane above and inside of the block."""
+    along = np.sqrt(0.5)
+    fillet = [[20, 4 - r * along, 8 + r * along] for r in (4.0, 4.01, 3.5)]
+    places = np.array([*fillet, [30, 22 + 4.8, 5], [50, 20, 12], [50, 20, 12.002], [10, 30, 5]])
+    found = distances(rounded(tmp_path), places)
+    assert found == pytest.approx([0, 0.01, 0.5, 0.2, 0, 0.002, 5], abs=1e-5)
+
+
+@kernel
+def test_the_surfaces_of_a_mesh_that_stands_elsewhere_are_the_same(tmp_path):
+    file = rounded(tmp_path)
+    triangles = np.roll(step.read(file).triangles, 1, 2) + [5.0, 0, 3]
+    trimesh.Trimesh(**trimesh.triangles.to_kwargs(triangles)).export(tmp_path / "moved.stl")
+    pair = pairs.compared(file, tmp_path / "moved.stl")
+    assert "(elsewhere)" in str(pair)
+    assert pair.apart < 1e-5  # mm: single precision
 
 
 @kernel

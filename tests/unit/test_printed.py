@@ -16,6 +16,7 @@ import planner
 import scenes
 from planner.budgeting.budgets import budget
 from planner.design import Choice
+from planner.robustness import Move
 from render import EffectTolerance
 from render.phenomena import Decision, Influence
 from scenes import Pose, Tolerance
@@ -188,8 +189,8 @@ def of_three(found):
 
 
 def robustly(found):
-    moves = (planner.robustness.Move("noise", 0.9, 0.81, 0.8, 1.5, 2.5),
-             planner.robustness.Move("roughness", 1.2, 1.4, 1.3, 3.5, 4.5))  # fmt: skip
+    moves = (Move("noise", 0.9, 0.81, 0.8, 1.5, 2.5),
+             Move("roughness", 1.2, 1.4, 1.3, 3.5, 4.5))  # fmt: skip
     return planner.Robust(Pose(31.5, 42), Pose(21.25, 250.5), 0.5, 0.25, 0.75, moves, 50)
 
 

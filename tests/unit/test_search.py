@@ -189,6 +189,6 @@ def test_the_planner_loads_no_renderer_and_nothing_that_loads_slower_than_it_ans
     import subprocess
     import sys
 
-    slow = "{'mitsuba', 'drjit', 'cv2', 'matplotlib', 'scipy.stats'}"
+    slow = "{'mitsuba', 'drjit', 'cv2', 'matplotlib', 'scipy.stats', 'scipy.spatial', 'planner.planning'}"
     code = f"import sys, planner.budgeting.budgets; print({slow} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "set()"

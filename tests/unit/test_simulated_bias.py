@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import measure
+import planner
 import scenes
 from imaging.geometry.projection import project
 from imaging.models.texture import texture_errors
@@ -295,6 +296,26 @@ def test_the_place_of_a_light_moves_an_arrangement_by_what_its_images_show():
         found = simulation.simulated(Picture.of(scene, sensor, light), Method("arrangement"))
         assert found.status == ("ok",)
         assert found.sources["light_place"][0] < 0.1 * found.sigma[0]
+
+
+@pytest.mark.parametrize(("off", "rendered"), [(0.05, 0), (0.2, 7)])
+def test_lights_elsewhere_are_drawn_where_the_image_model_draws_the_render(small_task1, off, rendered, monkeypatch):
+    """Parts of a pixel's noise that they differ by: half of what is allowed, and twice as much."""
+    picture, shown = Picture.of(small_task1, *POSES), []
+
+    def image(how, other, effects, seed):
+        shown.append(other)
+        return planner.image(other)
+
+    monkeypatch.setattr(How, "_rendered", image)
+    here = planner.image(picture)
+    first = here + off * small_task1.noise.sigma * np.random.default_rng(3).choice([-1, 1], here.shape)
+    images = imagery.completed(picture, (first,), (), How().by(Method("arrangement")))
+    assert len(shown) == rendered
+    others = [planner.image(each) - here for each in inputs.with_lights_moved(picture, math.sqrt(3.0))]
+    for made, other in zip(images.changed["light_place"][::2], others, strict=True):
+        assert np.abs(other).max() > 0.1
+        assert made - first == pytest.approx(other / math.sqrt(3.0), abs=0.1 * np.abs(other).max())  # of first order
 
 
 class _Rendered(How):
@@ -614,8 +635,8 @@ def test_what_is_compared_has_finer_pixels_up_to_a_megapixel(picture, below, fin
 
 def test_what_few_rays_tell_of_all_levels_moves_no_edge():
     """An edge that few rays show aside: of a picture that is a tenth darker the image is, too; a spot of 5 is one."""
-    first, here = np.array([[100.0, 100.0, 20.0, 20.0]]), np.array([[100.0, 70.0, 20.0, 20.0]])
-    assert imagery._changed(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
-    with_spot = first + np.array([[0.0, 0.0, 0.0, 5.0]])
-    assert imagery._changed(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
-    assert imagery._changed(first, 0 * here, 0 * here).tolist() == [[0.0] * 4]
+    first, here = np.array([100.0, 100.0, 20.0, 20.0]), np.array([100.0, 70.0, 20.0, 20.0])
+    assert imagery._as(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
+    with_spot = first + np.array([0.0, 0.0, 0.0, 5.0])
+    assert imagery._as(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
+    assert imagery._as(first, 0 * here, 0 * here).tolist() == [0.0] * 4

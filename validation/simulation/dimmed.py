@@ -19,6 +19,7 @@ from imaging.geometry.looked_at import looked_at
 from imaging.light.between import light_of_dimmed
 from imaging.pictures import Pictures
 from measure.correction import mean_of
+from render.adaptive import places
 from render.surroundings import near_required
 from scenes import Picture
 
@@ -52,10 +53,10 @@ def of_one_surface(
     if part == 0 or scene.materials or scene.bright_floor is not None or scene.solid.curved:
         return None
     between = mean_of(renders) - direct()
-    lent = np.argwhere((np.abs(between) > _LEAST * renders[0].max()) & _asked(picture, between.shape))
-    faces, places = looked_at(picture, undistorted(lent[:, ::-1].astype(float), scene.camera))
+    lent = places((np.abs(between) > _LEAST * renders[0].max()) & _asked(picture, between.shape)).T
+    faces, met = looked_at(picture, undistorted(lent[:, ::-1].astype(float), scene.camera))
     inner = (faces >= 0) & ~np.append(scene.bodies.outer, True)[faces]
-    told = light_of_dimmed(Pictures.of(picture), part, places[inner], faces[inner])
+    told = light_of_dimmed(Pictures.of(picture), part, met[inner], faces[inner])
     if told is None:
         return None
     box = _about(lent[inner], between.shape, edge_blur(scene.camera.blur_px))

@@ -6,7 +6,8 @@ step more does more than one less. By how much both lie off the straight line co
 square is one on the mean, in standard uncertainties. In images above a megapixel, where that takes long, what one
 material does is told by the render itself, less its direct light (`dimmed`). Lights that stand elsewhere are rendered
 so, too, both ways and as far as they may stand, for a shadow may reach an edge from there alone; in large images their
-direct light. Of plain scenes the closed form of the bias tells what lights do.
+direct light. Of plain scenes the closed form of the bias tells what lights do, or images of the image model do, where
+that draws the render itself.
 Renders that are compared have the same rays, one by one, or their difference would be noise; and what makes a picture
 brighter or darker as a whole, which moves nothing, is not told by few rays but by the render itself.
 """
@@ -16,13 +17,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, partial, reduce
 
 import numpy as np
 
+from imaging.blurred.whole import image as drawn
+from imaging.blurred.whole import is_drawable
+from imaging.colour import seen
 from measure import Images
 from render.build import MANY_WAYS
 from render.large import LARGE
+from render.surroundings import near_required
 from scenes import Picture
 from validation.simulation.dimmed import of_one_surface
 from validation.simulation.how import BETWEEN, How, is_below
@@ -40,6 +45,7 @@ from validation.simulation.inputs import (
 _LIMIT = math.sqrt(3.0)  # standard deviations: the end of a uniform distribution, where a shadow may reach an edge
 _SETS = 4  # of rays that tell what changes a bias that is not known well enough
 _OVERALL = {"supersample": 1, "samples": 1, "edge_samples": 4, "random_samples": 16}
+_DRAWN = 0.1  # of a pixel's noise: nearer to a render, the image model tells what a light elsewhere does
 _LEVELS = 64  # random samples of the image that a picture is compared with
 
 
@@ -67,10 +73,21 @@ def completed(
         lines = {LIGHT: lines_by_lights(picture)}
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
-        made = whole if is_below(picture, LARGE) else direct
+        drawing = cache(drawn)
+        rendered = whole if is_below(picture, LARGE) else direct
+        made = drawing if _is_drawn(picture, first, drawing) else rendered
         changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
     changed = {name: some for name, some in changed.items() if some}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
+
+
+def _is_drawn(picture: Picture, render: np.ndarray, drawing: Callable[[Picture], np.ndarray]) -> bool:
+    """Whether the image model draws a render, near what is measured, far below the noise of a pixel, rms."""
+    if not is_drawable(picture.scene):
+        return False
+    near = near_required(picture, (slice(0, render.shape[0]), slice(0, render.shape[1])), 1)
+    squares = np.square(drawing(picture) - render) / seen(picture.scene.noise, render).noise_variance
+    return bool(near.any()) and float(squares[near].mean()) < _DRAWN**2
 
 
 def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
@@ -125,19 +142,12 @@ def _both_ways(
 ) -> tuple[np.ndarray, ...]:
     """For each input the first render with what it does on the straight line, and with what both ways lie off it."""
     ways = [each for pair in _pairs(others, picture, times) for each in pair]
-    seen = iter(_steps(first, made, ways, picture))
+    lit, here, found = _changed(first, made, ways, picture)
     return tuple(
-        _added(first, part, 2 * times)
-        for one, other in zip(seen, seen, strict=True)
-        for part in (one - other, one + other - 2 * first)
+        _added(first, lit, part / (2 * times))
+        for one, other in zip(found[::2], found[1::2], strict=True)
+        for part in (one - other, one + other - 2 * here)
     )
-
-
-def _added(first: np.ndarray, part: np.ndarray, over: float) -> np.ndarray:
-    """The first render and a difference over a number, in the memory of the latter."""
-    part /= over
-    part += first
-    return part
 
 
 def _steps(
@@ -147,23 +157,36 @@ def _steps(
     picture: Picture,
 ) -> tuple[np.ndarray, ...]:
     """The first render with what other pictures differ by from this one, both of the same random numbers."""
-    changed, dark = [made(other) for other in others], picture.scene.noise.dark_level
-    here = made(picture) if changed else first
-    return tuple(_changed(first, here, other, dark) for other in changed)
+    lit, here, found = _changed(first, made, others, picture)
+    return tuple(_added(first, lit, each - here) for each in found)
 
 
-def _changed(first: np.ndarray, here: np.ndarray, other: np.ndarray, dark: float = 0.0) -> np.ndarray:
-    """An image as another one differs from this one, ``here``, both of few rays; grey levels.
+def _added(first: np.ndarray, lit: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """The first render with something at some of its pixels."""
+    image = first.copy()
+    image.ravel()[lit] += part
+    return image
 
-    Of the same picture with many rays, ``first``. Edges lie a little elsewhere in an image of few rays: what it says
-    of all levels together is taken of the other image itself, or a light that is farther away would move them. Most of
-    a large image is dark where nothing is measured, and so are both: only the rest of them is read.
+
+def _changed(
+    first: np.ndarray, made: Callable[[Picture], np.ndarray], others: Iterable[Picture], picture: Picture
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Which pixels are lit, flat indices, levels of the first render there, above darkness, and as others change them.
+
+    Most of a large image is dark where nothing is measured, in all of them.
     """
-    lit = np.flatnonzero((here != dark) | (other != dark))
-    before, after = (image.ravel()[lit] - dark for image in (here, other))
-    part = float(after @ before) / max(float(before @ before), np.finfo(float).tiny)
-    changed = first - dark
-    changed *= part
-    changed += dark
-    changed.ravel()[lit] += after - part * before
-    return changed
+    images, dark = [made(other) for other in others], picture.scene.noise.dark_level
+    images = [first, made(picture) if images else first, *images]
+    lit = np.flatnonzero(reduce(np.logical_or, (image != dark for image in images)))
+    levels, before, *after = (image.ravel()[lit] - dark for image in images)
+    return lit, levels, [_as(levels, before, each) for each in after]
+
+
+def _as(levels: np.ndarray, here: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Levels of many rays as those of few differ, ``other`` from ``here``, all above darkness.
+
+    Edges lie a little elsewhere in an image of few rays: what it says of all levels together is taken of the image of
+    many itself, or a light that is farther away would move them.
+    """
+    part = float(other @ here) / max(float(here @ here), np.finfo(float).tiny)
+    return part * levels + (other - part * here)
