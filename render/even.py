@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 if TYPE_CHECKING:
-    from render.large import Renders
+    from render.large import Counts, Renders
 
 _ALIKE = 0.75  # of the rays of a pixel's fine ones, each way: as noisy as those (bracket_mm: 0.756)
 _FEWER = 2  # times fewer rays, each way, where noise moves no edge
@@ -60,7 +60,7 @@ class Zones:
 
 
 def with_light_between(
-    renders: Renders, even: Even, first: np.ndarray, fine: np.ndarray, zones: Zones, marked: np.ndarray, few: int
+    renders: Renders, even: Even, first: np.ndarray, fine: np.ndarray, zones: Zones, marked: np.ndarray, counts: Counts
 ) -> np.ndarray:
     """The image with light between faces in all fine pixels but the marked ones.
 
@@ -75,12 +75,11 @@ def with_light_between(
     zones : Zones
     marked : ndarray of bool
         Fine pixels that an edge crosses.
-    few : int
-        Rays of a fine pixel.
+    counts : Counts
     """
-    k = renders.supersample
+    k, few, close_by = renders.supersample, counts.few, counts.near
     plain = zones.lent & ~even.crossed() & ~some_of(marked, k)
-    many = max(round(_ALIKE * k * math.sqrt(few)), 1)
+    many = max(round(_ALIKE * k * math.sqrt(close_by)), 1)
     parts = [
         (plain & zones.near & zones.moving, many**2),
         (plain & zones.near & ~zones.moving, max(many // _FEWER, 1) ** 2),
@@ -93,7 +92,7 @@ def with_light_between(
     for where, rays in parts:
         fine = _taken(fine, renders.whole(True, rays, where), where, k) if where.any() else fine
     uneven = fine_of(zones.near & zones.lent & ~plain, k) & ~marked
-    return renders.again(True, fine, uneven, few) if uneven.any() else fine
+    return renders.again(True, fine, uneven, close_by) if uneven.any() else fine
 
 
 def _nodes(plain: np.ndarray, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

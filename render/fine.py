@@ -24,13 +24,12 @@ from render.between import edges_of, lent_to
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.even import Even, some_of
 from render.gathered import Gathering
-from render.large import Renders, fine_pixels, is_large, whole_pixels
+from render.large import Counts, Renders, fine_pixels, is_large, whole_pixels
 from render.mosaic import Tiles
 from render.parts import Part
 from render.quality import Quality
 from render.rays import AT_ONCE, LARGE_AT_ONCE, SURFACES, Rays
 from render.sight import Sight
-from render.surroundings import near_edges
 from render.texture import Face
 from scenes import Picture
 
@@ -162,6 +161,13 @@ class _Tracer:
         """Rays of a fine pixel where they are random and no edge crosses it."""
         return (self.quality.random_samples or (4 if self.quiet else 16)) * self.quality.denser**2
 
+    @property
+    def near(self) -> int:
+        """The same of one that something is measured from."""
+        if not self.quality.everywhere or is_large(self.crop, self.quality.supersample, random=True):
+            return self.few
+        return min(_NEAR * self.quality.denser**2, self.many) if self.quiet else self.many
+
     @cached_property
     def gathering(self) -> Gathering | None:
         """What adds light that met more surfaces than rays follow."""
@@ -171,9 +177,8 @@ class _Tracer:
 
     @property
     def is_large(self) -> bool:
-        apart = self.scalar and self.quality.alike  # what surfaces send to each other
-        some = self.random and (apart or not self.quality.everywhere)
-        return some or is_large(self.crop, self.quality.supersample, self.random)
+        """Whether not all fine pixels are rendered: there are many, or each needs many rays."""
+        return self.random or is_large(self.crop, self.quality.supersample)
 
     def rays(self, active: frozenset[str]) -> Rays:
         """Of a compiled variant, with some effects."""
@@ -282,8 +287,8 @@ class _Tracer:
             self._even() if between and plane else None,
             self.quality.alike,
         )
-        rays = self.ordinary, self.few, self.many
-        return fine_pixels(picture, self.crop, renders, math.ceil(k * defocus(picture)), rays)
+        counts = Counts(self.ordinary, self.few, self.near, self.many)
+        return fine_pixels(picture, self.crop, renders, math.ceil(k * defocus(picture)), counts)
 
     def _even(self) -> Even:
         """Where light that plane faces send to each other may be seen, in whole pixels, and where it is even."""
@@ -300,22 +305,13 @@ class _Tracer:
         return Even(lambda marked: lent_to(self.picture, marked, first, 1), uneven)
 
     def small(self) -> np.ndarray:
-        """Image of which all fine pixels are rendered, and those near edges again."""
+        """Image of which all fine pixels are rendered, and those that an edge crosses again."""
         loaded = self.load(self.sharp, self.ordinary, self.textures)
         fine = self.rendered(loaded, self.sharp, self.ordinary)
         marked = self._crossed(fine)
-        if not self.random:
-            return self.again(loaded, self.active, fine, marked, self.many)
-        loaded, near = self.load(self.active, self.few), near_edges(self.picture, self.crop, self.quality.supersample)
-        everywhere = np.ones_like(marked)
-        if self.scalar:
-            fine = self.rendered(loaded, self.active, self.few)
-        else:
-            fine = refine(loaded, self.rays(self.active), fine, everywhere, self.few)
-        if self.quiet:
-            fine = self.again(loaded, self.active, fine, near & ~marked, min(_NEAR * self.quality.denser**2, self.many))
-        else:
-            marked |= near
+        if self.random:
+            loaded = self.load(self.active, self.few)
+            fine = self.again_alone(loaded, self.active, fine, np.ones_like(marked), self.few)
         return self.again(loaded, self.active, fine, marked, self.many)
 
     def _crossed(self, fine: np.ndarray) -> np.ndarray:

@@ -1,11 +1,11 @@
-"""Images of several megapixels: many rays only where the task's edges and circles are measured from.
+"""Images of several megapixels, or of random rays: many only where the task's edges and circles are measured from.
 
-All fine pixels of 5 megapixels are 80 million. Here a first image of whole pixels shows where brightness steps; only
-those pixels are divided; if only what is measured is to be seen, pixels that nothing is measured by stay dark. A fine
-pixel that an edge crosses gets all its rays where something is measured by it, and few
-elsewhere. Where a single ray is random (interreflection, an aperture, a light of some size), pixels that nothing is
-measured by get the rays of one fine pixel. What plane faces send to each other is even over a pixel that no edge
-crosses: such pixels are rendered as a whole (`render.even`).
+All fine pixels of 5 megapixels are 80 million, and where a single ray is random (interreflection, an aperture, a light
+of some size) each needs many. Here a first image of whole pixels shows where brightness steps; only those pixels are
+divided; if only what is measured is to be seen, pixels that nothing is measured by stay dark. A fine pixel that an edge
+crosses gets all its rays where something is measured by it, and few elsewhere. Where rays are random, pixels that
+nothing is measured by get those of one fine pixel. What plane faces send to each other is even over a pixel that no
+edge crosses: such pixels are rendered as a whole (`render.even`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from render.surroundings import near_required
 from scenes import Picture
 
 LARGE = 1 << 20  # pixels of an image whose fine pixels are not all rendered
-LARGE_RANDOM = 1 << 17  # the same where a single ray is random, and each fine pixel needs many
+LARGE_RANDOM = 1 << 17  # the same of random rays, of which each pixel then gets fewer
 _MOVING = 3.0  # standard deviations of scale and blur together: noise of pixels farther from an edge does not move it
 _FEWER = 2  # times fewer rays there, each way
 _PILOT, _AROUND = 4, 2  # rays that tell whether surfaces send light to a pixel, and pixels around of which they tell
@@ -65,6 +66,16 @@ class Renders:
     alike: bool = False
 
 
+class Counts(NamedTuple):
+    """Rays of a fine pixel: an ordinary one, and where rays are random one that nothing is measured from, one that
+    something is; one that an edge crosses."""
+
+    ordinary: int
+    few: int
+    near: int
+    many: int
+
+
 def whole_pixels(crop: tuple[slice, slice], supersample: int) -> tuple[slice, slice]:
     """A crop of fine pixels, in pixels."""
     rows, columns = (slice(part.start // supersample, part.stop // supersample) for part in crop)
@@ -82,7 +93,7 @@ def is_large(crop: tuple[slice, slice], supersample: int, random: bool = False) 
 
 
 def fine_pixels(
-    picture: Picture, crop: tuple[slice, slice], renders: Renders, reach: int, rays: tuple[int, int, int]
+    picture: Picture, crop: tuple[slice, slice], renders: Renders, reach: int, counts: Counts
 ) -> np.ndarray:
     """Image of the crop's fine pixels.
 
@@ -94,13 +105,12 @@ def fine_pixels(
     renders : Renders
     reach : int
         Radius of the largest circle of confusion, fine pixels.
-    rays : tuple of int
-        Of an ordinary fine pixel, of one where rays are random, and of one that an edge crosses.
+    counts : Counts
     """
-    k, (ordinary, few, many) = renders.supersample, rays
+    k, (ordinary, few, close_by, many) = renders.supersample, counts
     near = near_required(picture, crop, k)
     if renders.bounced is not None:
-        direct = fine_pixels(picture, crop, replace(renders, random=False, bounced=None), reach, rays)
+        direct = fine_pixels(picture, crop, replace(renders, random=False, bounced=None), reach, counts)
         moving = near_required(picture, crop, k, _MOVING)
         if renders.everywhere:
             near, moving = np.ones_like(near), np.ones_like(moving)
@@ -121,14 +131,14 @@ def fine_pixels(
     if renders.random and renders.alike and not renders.everywhere:
         return renders.again(True, fine, close & lent, max(few, many))
     if renders.random and renders.even is not None:
-        moving = near_required(picture, crop, k, _MOVING)
-        fine = with_light_between(renders, renders.even, first, fine, Zones(seen, near, moving), marked, few)
+        moving = near if close_by > few else near_required(picture, crop, k, _MOVING)
+        fine = with_light_between(renders, renders.even, first, fine, Zones(seen, near, moving), marked, counts)
     elif renders.random:
-        fine = fine_of(renders.whole(True, few), k) if renders.everywhere else fine
+        fine = fine_of(renders.whole(True, close_by), k) if renders.everywhere else fine
         plain, moving = close & ~marked, True
         if is_large(crop, k, random=True):  # else few rays at all would tell the variances badly
             moving = fine_of(near_required(picture, crop, k, _MOVING), k)
-        fine = _with_random(renders, fine, plain & moving, plain & ~np.asarray(moving), few)
+        fine = _with_random(renders, fine, plain & moving, plain & ~np.asarray(moving), close_by)
     for where, count in ((marked & ~close, min(many, _BESIDE)), (marked & close, many)):
         for random in sorted({False, renders.random}):
             some = where & lent if random else where & ~np.asarray(lent & renders.random)

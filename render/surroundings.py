@@ -9,49 +9,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from imaging.features.limb_outline import limb_outline
-from imaging.features.projected_edges import circles, projected_edges
-from imaging.features.rim_sides import RIM_POINTS
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project, project_ideal
-from imaging.pictures import Pictures
 from scenes import Curved, Picture
-
-
-def near_edges(picture: Picture, crop: tuple[slice, slice], supersample: int) -> np.ndarray:
-    """Fine pixels of the crop that edges and circles are located from, and their surroundings, as a mask."""
-    locator, shape = picture.scene.locator, [(part.stop - part.start) // supersample for part in crop]
-    rows, columns = (part.start // supersample + np.arange(n) for part, n in zip(crop, shape, strict=True))
-    pixels = np.stack(np.meshgrid(columns, rows), -1).astype(float)
-    found = np.zeros(shape, bool)
-    for start, stop in [*projected_edges(Pictures.of(picture)).recorded, *_around(picture)]:
-        along = stop - start
-        part = np.clip((pixels - start) @ along / max(along @ along, np.finfo(float).tiny), 0, 1)
-        away = np.linalg.norm(pixels - start - part[..., None] * along, axis=-1)
-        found |= away <= locator.window_px + 4 * locator.scale_px + 1
-    return found.repeat(supersample, 0).repeat(supersample, 1)
-
-
-def _around(picture: Picture) -> list[np.ndarray]:
-    """Pieces of the images of the required circles and limbs, (2, 2) each, px."""
-    pieces = []
-    for name in circles(picture.scene):
-        circle = picture.scene.solid.round(name)
-        if isinstance(circle, Curved):
-            pieces += _limb(picture, circle)
-            continue
-        places = circle.at(circle.angles(RIM_POINTS))
-        rim = project(places, np.array(list(picture.sensor)), picture.scene.camera)
-        whole = np.stack([rim, np.roll(rim, -1, 0)], 1)
-        pieces += list(whole if circle.ends is None else whole[:-1])
-    return pieces
-
-
-def _limb(picture: Picture, curved: Curved) -> list[np.ndarray]:
-    """Pieces of a limb's image, (2, 2) each, px."""
-    outline = limb_outline(curved, np.array(list(picture.sensor)), picture.scene.camera)
-    at = outline.at + image_centre(picture.scene.camera)
-    pieces = np.stack([at, np.roll(at, -1, 0)], 1)
-    return list(pieces[np.isfinite(pieces).all((1, 2))])
 
 
 def near_required(
@@ -91,3 +51,11 @@ def _near_required(
     near = maximum_filter(found, 2 * math.ceil(reach) + 1)
     near.flags.writeable = False
     return near
+
+
+def _limb(picture: Picture, curved: Curved) -> list[np.ndarray]:
+    """Pieces of a limb's image, (2, 2) each, px."""
+    outline = limb_outline(curved, np.array(list(picture.sensor)), picture.scene.camera)
+    at = outline.at + image_centre(picture.scene.camera)
+    pieces = np.stack([at, np.roll(at, -1, 0)], 1)
+    return list(pieces[np.isfinite(pieces).all((1, 2))])

@@ -5,9 +5,9 @@ import pytest
 
 from render import large
 from render.even import Even
-from render.large import Renders, fine_pixels, is_large
+from render.large import Counts, Renders, fine_pixels, is_large
 
-K, SIZE, RAYS = 2, (40, 50), (4, 16, 256)
+K, SIZE, RAYS = 2, (40, 50), Counts(4, 16, 16, 256)
 
 
 @pytest.mark.parametrize(("pixels", "random", "expected"), [(0, True, True), (0, False, True), (-1, True, False)])

@@ -279,7 +279,8 @@ def _pieces():
         return np.where(marked, truth + rays, fine)
 
     crop = slice(2 * 60, 2 * 60 + 80), slice(2 * 70, 2 * 70 + 100)
-    made = [large.fine_pixels(picture, crop, large.Renders(whole, again, k, random), 3, (4, 16, 256)) for random in (
+    counts = large.Counts(4, 16, 16, 256)
+    made = [large.fine_pixels(picture, crop, large.Renders(whole, again, k, random), 3, counts) for random in (
         False, True)]  # fmt: skip
     places = {name: large.near_required(Picture.of(load(name), *uneven(load(name))), (slice(0, 240), slice(0, 250)), 1)
               for name in ("task1", "plate", "ball", "shaft")}  # fmt: skip
