@@ -651,8 +651,8 @@ def test_what_is_compared_has_finer_pixels_up_to_a_megapixel(picture, below, fin
 
 def test_what_few_rays_tell_of_all_levels_moves_no_edge():
     """An edge that few rays show aside: of a picture that is a tenth darker the image is, too; a spot of 5 is one."""
-    first, here = np.array([100.0, 100.0, 20.0, 20.0]), np.array([100.0, 70.0, 20.0, 20.0])
-    assert imagery._as(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
-    with_spot = first + np.array([0.0, 0.0, 0.0, 5.0])
-    assert imagery._as(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
-    assert imagery._as(first, 0 * here, 0 * here).tolist() == [0.0] * 4
+    first, here = np.array([[100.0, 100.0, 20.0, 20.0]]), np.array([[100.0, 70.0, 20.0, 20.0]])
+    assert imagery._changed(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
+    with_spot = first + np.array([[0.0, 0.0, 0.0, 5.0]])
+    assert imagery._changed(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
+    assert imagery._changed(first, 0 * here, 0 * here).tolist() == [[0.0] * 4]
