@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import cache, partial, reduce
+from functools import cache, partial
 
 import numpy as np
 
@@ -142,12 +142,19 @@ def _both_ways(
 ) -> tuple[np.ndarray, ...]:
     """For each input the first render with what it does on the straight line, and with what both ways lie off it."""
     ways = [each for pair in _pairs(others, picture, times) for each in pair]
-    lit, here, found = _changed(first, made, ways, picture)
+    found = iter(_steps(first, made, ways, picture))
     return tuple(
-        _added(first, lit, part / (2 * times))
-        for one, other in zip(found[::2], found[1::2], strict=True)
-        for part in (one - other, one + other - 2 * here)
+        _added(first, part, 2 * times)
+        for one, other in zip(found, found, strict=True)
+        for part in (one - other, one + other - 2 * first)
     )
+
+
+def _added(first: np.ndarray, part: np.ndarray, over: float) -> np.ndarray:
+    """The first render and a difference over a number, in the memory of the latter."""
+    part /= over
+    part += first
+    return part
 
 
 def _steps(
@@ -157,36 +164,23 @@ def _steps(
     picture: Picture,
 ) -> tuple[np.ndarray, ...]:
     """The first render with what other pictures differ by from this one, both of the same random numbers."""
-    lit, here, found = _changed(first, made, others, picture)
-    return tuple(_added(first, lit, each - here) for each in found)
+    changed, dark = [made(other) for other in others], picture.scene.noise.dark_level
+    here = made(picture) if changed else first
+    return tuple(_changed(first, here, other, dark) for other in changed)
 
 
-def _added(first: np.ndarray, lit: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """The first render with something at some of its pixels."""
-    image = first.copy()
-    image.ravel()[lit] += part
-    return image
+def _changed(first: np.ndarray, here: np.ndarray, other: np.ndarray, dark: float = 0.0) -> np.ndarray:
+    """An image as another one differs from this one, ``here``, both of few rays; grey levels.
 
-
-def _changed(
-    first: np.ndarray, made: Callable[[Picture], np.ndarray], others: Iterable[Picture], picture: Picture
-) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Which pixels are lit, flat indices, levels of the first render there, above darkness, and as others change them.
-
-    Most of a large image is dark where nothing is measured, in all of them.
+    Of the same picture with many rays, ``first``. Edges lie a little elsewhere in an image of few rays: what it says
+    of all levels together is taken of the other image itself, or a light that is farther away would move them. Most of
+    a large image is dark where nothing is measured, and so are both: only the rest of them is read.
     """
-    images, dark = [made(other) for other in others], picture.scene.noise.dark_level
-    images = [first, made(picture) if images else first, *images]
-    lit = np.flatnonzero(reduce(np.logical_or, (image != dark for image in images)))
-    levels, before, *after = (image.ravel()[lit] - dark for image in images)
-    return lit, levels, [_as(levels, before, each) for each in after]
-
-
-def _as(levels: np.ndarray, here: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Levels of many rays as those of few differ, ``other`` from ``here``, all above darkness.
-
-    Edges lie a little elsewhere in an image of few rays: what it says of all levels together is taken of the image of
-    many itself, or a light that is farther away would move them.
-    """
-    part = float(other @ here) / max(float(here @ here), np.finfo(float).tiny)
-    return part * levels + (other - part * here)
+    lit = np.flatnonzero((here != dark) | (other != dark))
+    before, after = (image.ravel()[lit] - dark for image in (here, other))
+    part = float(after @ before) / max(float(before @ before), np.finfo(float).tiny)
+    changed = first - dark
+    changed *= part
+    changed += dark
+    changed.ravel()[lit] += after - part * before
+    return changed
