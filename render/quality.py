@@ -22,10 +22,12 @@ class Quality:
         Rays of a fine pixel that an edge crosses, a square number; 256 when not given, but in scalar variants 64 for a
         diffuse surface, and 16 for the paper's reflectance where it has no texture (`render.texture`) and runs as
         interpreted Python, some 40 times slower. Where single rays are random all pixels that the task's edges are
-        located from get as many; of curved parts whose random light is faint, in scalar variants, 16.
+        located from get as many, in images of at most 131,072 pixels; of curved parts whose random light is faint, in
+        scalar variants, 16. In larger ones, and where not ``everywhere``, they get ``random_samples``.
     random_samples : int, optional
-        Rays of every other fine pixel where a single ray is random wherever it hits (interreflection, an aperture, a
-        light of finite size), a square number; 16 when not given, 4 in scalar variants where that light is faint.
+        Rays of every other pixel, as a whole, where a single ray is random wherever it hits (interreflection, an
+        aperture, a light of finite size), a square number; 16 when not given, 4 in scalar variants where that light is
+        faint. Light between plane faces is told by fewer pixels there, straight lines between them.
     seed : int
     everywhere : bool
         Whether pixels that nothing is measured by are seen as well as the others. If not, they are dark or, where light

@@ -78,7 +78,7 @@ def propose(
     budget = planner.budget(picture.with_scene(_as_calibrated(picture.scene, found)))
     by_source = dict(zip((each.name for each in budget.sources), budget.sensitivities[names.index(name)], strict=True))
     if found.is_splined:
-        slopes = np.array([by_source[f"{LENS_MODE} {number}"] for number in range(1, found.errors.shape[1] + 1)])
+        slopes = np.array([slope for source, slope in by_source.items() if source.startswith(LENS_MODE)])
     else:
         slopes = found.errors.T @ [by_source[each] for each in found.names]
     told, now = next_board(found, boards, square_size, slopes), budget[name]

@@ -79,9 +79,8 @@ def check_drawable(scene: Scene) -> None:
     InvalidInput
         If not.
     """
-    if not is_plain(scene):
-        raise InvalidInput(
-            "scene must be one convex body before darkness, got one in which things hide or shade others"
-        )
-    if scene.textures:
+    if is_drawable(scene):
+        return
+    if is_plain(scene):
         raise InvalidInput("scene must be without textures, got some")
+    raise InvalidInput("scene must be one convex body before darkness, got one in which things hide or shade others")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,7 @@ class CameraCalibration:
         even = (self.covariance + self.covariance.T) / 2
         return Covariance(names=self.names, matrix=tuple(tuple(map(float, row)) for row in even))
 
-    @property
+    @cached_property
     def errors(self) -> np.ndarray:
         """Independent standard errors of the values, shape (k, m), a column each (`measure.boards.lens_modes`)."""
         return errors_of(self)

@@ -312,10 +312,8 @@ def bundles(
                 found = of_part(scene, draws, sets, seeds)
                 rows, wrong, passed = rows + found[0], wrong + found[1], passed + found[2]
     if only in ("", "board"):
-        made_by = render.image if rendered else image
-        found, unseen = of_board(
-            3 * sets, seed, made_by
-        )  # of four rows fewer do not show a variance 1.3 times too large
+        many = 3 * sets  # of four rows fewer do not show a variance 1.3 times too large
+        found, unseen = of_board(many, seed, render.image if rendered else image)
         rows, passed = rows + found, passed + unseen
     if only in ("", "station"):
         told = of_station(draws, seed, smaller)

@@ -146,13 +146,13 @@ def held(every: list[Pulls]) -> bool:
         chance = 1 / np.sqrt(2 * pull.size)
         told = f"mean {pull.mean():+.3f}, spread {pull.std():.3f}"
         print(f"{label}: {pull.size} pulls, {told} (chance {chance:.3f}, were they independent)")
-    each = [Row(name, pull) for some in every for name, pull in zip(some.names, np.array(some.values).T, strict=True)]
-    held, ratios = inside(each), [row.ratio for row in each]
-    told = f"{min(ratios):.2f} to {max(ratios):.2f}, {sum(held)} inside chance"
-    print(f"measured / told variances of {len(each)} values: {told}")
+    single = [Row(name, pull) for part in every for name, pull in zip(part.names, np.array(part.values).T, strict=True)]
+    by_chance, ratios = inside(single), [row.ratio for row in single]
+    told = f"{min(ratios):.2f} to {max(ratios):.2f}, {sum(by_chance)} inside chance"
+    print(f"measured / told variances of {len(single)} values: {told}")
     print(f"found {found} of {tried}")
     good = found >= FOUND * tried and not sum(each.wrong for each in every)
-    good &= all(held) and all(is_as_told(pull) for _, pull in rows)
+    good &= all(by_chance) and all(is_as_told(pull) for _, pull in rows)
     controls = [is_as_told(pull / np.sqrt(1.3)) for _, pull in rows]
     controls += [is_as_told(pull[np.isfinite(pull)]) for pull in known if np.isfinite(pull).any()]
     print(f"controls that pass and must not: {sum(controls)} of {len(controls)}")

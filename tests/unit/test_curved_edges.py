@@ -10,14 +10,19 @@ from scenes.parts.facets import _along_lines
 ARC = [1.0, 1.1, 0.9, 1.0]  # lengths of pieces that turn by 6 degrees
 
 
+def path(turns, lengths):
+    """Vertices (n + 1, 3) of pieces of some lengths, each turned by so many degrees from the one before."""
+    way = np.radians(np.cumsum(turns))
+    steps = np.array(lengths)[:, None] * np.column_stack([np.cos(way), np.sin(way), 0 * way])
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, 0)])
+
+
 def pieces(lengths, turns, walls, scale=1.0, off=0.0, backwards=()):
     """Which pieces of an edge between plane face 0 and each one's wall (-1: another plane) are found to be curved.
 
     ``turns`` are degrees from each piece to the next; ``off`` moves every other vertex aside, in parts of the scale.
     """
-    turned = np.radians(np.cumsum([0.0, *turns]))
-    steps = np.array(lengths)[:, None] * np.column_stack([np.cos(turned), np.sin(turned), 0 * turned])
-    vertices = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, 0)])
+    vertices = path([0.0, *turns], lengths)
     vertices[1::2, 1] += off
     count = len(lengths)
     region = np.array([-1, *(-1 if wall < 0 else wall for wall in walls)])
@@ -89,9 +94,7 @@ def test_an_edge_between_planes_is_straight_however_it_turns():
 )
 def test_what_continues_a_curved_edge_in_a_line_is_a_piece_of_it_up_to_where_others_end(turn, others, length, found):
     """Two pieces of a curve, then one in their line, one that turns, or one beyond a vertex where another edge ends."""
-    way = np.radians(np.cumsum([0.0, 10.0, turn]))
-    steps = np.stack([np.cos(way), np.sin(way), 0 * way], -1) * np.array([1.0, 1.0, length])[:, None]
-    vertices = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, 0), np.full((1, 3), 9.0)])
+    vertices = np.concatenate([path([0.0, 10.0, turn], [1.0, 1.0, length]), np.full((1, 3), 9.0)])
     chains = [((0, 1), (0, 1), True), ((1, 2), (0, 2), True), ((2, 3), (0, 3), True)]
     chains += [((vertex, 4), (1, 3), True) for vertex in others]
     shape = Chains.of(vertices, chains, np.tile([0.0, 0, 1], (4, 1)), np.ones(4))
@@ -118,9 +121,7 @@ def test_a_piece_that_goes_on_as_smooth_ones_that_turn_is_none_of_a_straight_edg
 
     Nor beside another surface or plane; a smooth edge between two facets of the surface says nothing.
     """
-    way = np.radians(np.cumsum([0.0, 6.0, turn]))
-    steps = np.stack([np.cos(way), np.sin(way), 0 * way], -1) * np.array([1.0, 1.0, length])[:, None]
-    vertices = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, 0), [[2.0, -1, 1]]])
+    vertices = np.concatenate([path([0.0, 6.0, turn], [1.0, 1.0, length]), [[2.0, -1, 1]]])
     chains = [((i, i + 1), (0, i + 1), True) for i in range(3)] + [((2, 4), (2, 3), True)]
     shape = Chains.of(vertices, chains, np.tile([0.0, 0, 1], (4, 1)), np.ones(4))
     region, smooth = np.array([-1, 0, 0, wall]), np.array([True, True, False, True])
