@@ -17,8 +17,11 @@ from __future__ import annotations
 
 import itertools
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated
 
@@ -257,34 +260,42 @@ def board(estimated: tuple[str, ...] = ("focal",), pitch_sd: float = 0.002) -> S
     )
 
 
-def of_board(sets: int, seed: int, made_by: Callable[[Picture], np.ndarray] = image) -> tuple[list[Row], list[str]]:
+def of_board(sets: int, seed: int, rendered: bool = False, jobs: int = 1) -> tuple[list[Row], list[str]]:
     """Rows of a block beside a board by two and three sensors of which nothing is known, place, board and lens drawn
-    anew, in noise-free images that ``made_by`` makes; and the pitch's name where it passes for exact."""
-    rng, made, rows, wrong = np.random.default_rng(seed), board(), [], []
-    exact = [each.with_scene(board(pitch_sd=1e-9)) for each in _before_board(made)]
-    for count in (2, 3):
-        off, as_exact = [], []
-        for _ in range(sets):
-            pitch, beside, focal = (float(rng.normal(0, sd)) for sd in (0.002, 0.05, 5.0))
-            corner = made.placement.board.corner
-            held = {"pitch": made.placement.board.pitch + pitch, "corner": [corner[0] + beside, *corner[1:]]}
-            true = made.with_(placement={"board": held}, camera={"focal_px": made.camera.focal_px + focal})
-            place = np.concatenate([rng.uniform(-1, 1, 3) * [3, 3, 1.5], rng.uniform(-2, 2, 3)])
-            shots = []
-            for picture in _before_board(made)[:count]:
-                moved = _elsewhere(placed(picture.with_scene(true), place), *rng.normal(0, [0.5, 0.02, 0.02, 0.2]))
-                shots.append((render.expose(made_by(moved), true.noise, rng, 1)[0], picture))
-            told = measure.bundle(shots, "unknown")
-            known = measure.bundle([(one, each) for (one, _), each in zip(shots, exact, strict=False)], "unknown")
-            off.append((told.value - told.nominal) / told.u)
-            as_exact.append((known.value - known.nominal) / known.u)
-        label = f"board_block, {count} unknown"
-        good = np.isfinite(off).all(1)
-        print(f"  {label}: {int(good.sum())} of {sets} measured")
-        for m, name in enumerate(made.quantities):
-            rows.append(Row(f"{label} {name.name}", np.array(off)[good, m]))
-            wrong.append(Row(f"{label} {name.name}", np.array(as_exact)[good, m]))
+    anew, in exact or rendered pictures; and the pitch's name where it passes for exact."""
+    rows, wrong, names = [], [], [each.name for each in board().quantities]
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        for count in (2, 3):
+            label, pulls = f"board_block, {count} unknown", []
+            for done, pull in enumerate(pool.map(partial(_of_set, count, seed, rendered), range(sets)), start=1):
+                pulls.append(pull)
+                if done % 20 == 0:
+                    print(f"  {label}: {done} of {sets} sets, {np.nanvar(pulls, 0)[0].round(3)}", flush=True)
+            off, as_exact = np.array(pulls).swapaxes(0, 1)
+            good = np.isfinite(off).all(1)
+            print(f"  {label}: {int(good.sum())} of {sets} measured")
+            rows += [Row(f"{label} {name}", pull) for name, pull in zip(names, off[good].T, strict=True)]
+            wrong += [Row(f"{label} {name}", pull) for name, pull in zip(names, as_exact[good].T, strict=True)]
     return rows, ["pitch taken for exact"] if all(inside(wrong)) else []
+
+
+def _of_set(count: int, seed: int, rendered: bool, number: int) -> np.ndarray:
+    """Pulls (2, M) of the values of one set of so many pictures, by all that is told and with the pitch for exact."""
+    rng, made = np.random.default_rng((seed, count, number)), board()
+    pitch, beside, focal = (float(rng.normal(0, sd)) for sd in (0.002, 0.05, 5.0))
+    corner = made.placement.board.corner
+    held = {"pitch": made.placement.board.pitch + pitch, "corner": [corner[0] + beside, *corner[1:]]}
+    true = made.with_(placement={"board": held}, camera={"focal_px": made.camera.focal_px + focal})
+    place = np.concatenate([rng.uniform(-1, 1, 3) * [3, 3, 1.5], rng.uniform(-2, 2, 3)])
+    shots = []
+    for picture in _before_board(made)[:count]:
+        moved = _elsewhere(placed(picture.with_scene(true), place), *rng.normal(0, [0.5, 0.02, 0.02, 0.2]))
+        clean = render.image(moved) if rendered else image(moved)
+        shots.append((render.expose(clean, true.noise, rng, 1)[0], picture))
+    exact = _before_board(board(pitch_sd=1e-9))
+    told = measure.bundle(shots, "unknown")
+    known = measure.bundle([(one, each) for (one, _), each in zip(shots, exact, strict=False)], "unknown")
+    return np.array([(each.value - each.nominal) / each.u for each in (told, known)])
 
 
 def _before_board(scene: Scene) -> list[Picture]:
@@ -301,6 +312,7 @@ def bundles(
     only: Annotated[
         str, typer.Option(help="exact: two parts in exact images; station: bracket_station; board: board_block.")
     ] = "",
+    jobs: Annotated[int, typer.Option(help="Processes, for board_block.")] = 1,
 ) -> None:
     """Two and three pictures adjusted together: values scatter as told; exact 40 minutes, station 30, board 90."""
     rows, wrong, passed = [], [], []
@@ -313,7 +325,7 @@ def bundles(
                 rows, wrong, passed = rows + found[0], wrong + found[1], passed + found[2]
     if only in ("", "board"):
         many = 3 * sets  # of four rows fewer do not show a variance 1.3 times too large
-        found, unseen = of_board(many, seed, render.image if rendered else image)
+        found, unseen = of_board(many, seed, rendered, jobs)
         rows, passed = rows + found, passed + unseen
     if only in ("", "station"):
         told = of_station(draws, seed, smaller)
