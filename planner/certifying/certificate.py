@@ -62,15 +62,14 @@ class Certificate:
     @property
     def told(self) -> str:
         """In one sentence, without its end."""
+        scale = " whose levels are within the sensor's scale" * self.within_scale
         if self.grid_deg is not None:
-            part, grid = 100 * (1 - self.better_by), f"the {self.grid_deg:g} degree grid"
+            part, grid = 100 * (1 - self.better_by), f"the {self.grid_deg:g} degree grid{scale}"
             if part < _LEAST_TOLD:
                 return f"at a glance, of some pairs of {grid} nothing is known"
             return f"at a glance, no pair of {grid} has less than {part:.3g} % of this variance"
-        poses = "no pose" + " whose levels are within the sensor's scale" * self.within_scale
-        return (
-            f"{poses}, also between those of a grid, has less than {100 * (1 - self.better_by):.3g} % of this variance"
-        )
+        part = f"{100 * (1 - self.better_by):.3g} %"
+        return f"no pose{scale}, also between those of a grid, has less than {part} of this variance"
 
 
 def certified(
@@ -90,8 +89,9 @@ def certified(
     variance of no edge is negative, and that rounding errors are below a relative 1e-9. Constraints on what the sensor
     sees, and forbidden regions, only leave out places that the certificate covers, too.
 
-    Of other matt parts under points of light of which one is free, hollow ones and such on a floor, it is of all pairs
-    of a grid, by what a glance says of them: without the light that surfaces send to each other.
+    Of other parts of plane faces under points of light of which one is free, glossy and hollow ones and such on a
+    floor, it is of all pairs of a grid, by what a glance says of them: without the light that surfaces send to each
+    other.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def _on_grid(problem: SearchProblem, found: Plan, step_deg: float, within: float
         better = _better(problem, found, Found(end.value, end.sensor, end.lights))
     value = float(problem.values(*(pose[None] for pose in _setting(better)))[0])
     by = max(0.0, 1 - known.least / value)
-    told = Certificate(by <= within * (1 + 1e-9), within, by, known.least, known.pairs, False, step_deg)
+    told = Certificate(by <= within * (1 + 1e-9), within, by, known.least, known.pairs, known.within_scale, step_deg)
     return replace(better, certificate=told)
 
 
@@ -181,7 +181,7 @@ def check_certifiable(found: Plan, limits: Constraints) -> None:
         raise InvalidInput("same_mount must be left out for a certificate, got both")
     if not has_terms(scene) and not (has_pair_bounds(scene, found.model) and len(scene.free) == 1):
         raise InvalidInput(
-            "scene must be of matt parts without print, straight edges among what is measured, and points of light of "
+            "scene must be of plane faces without print, straight edges among what is measured, and points of light of "
             f"which one is free for a certificate, got {scene.name}"
         )
 

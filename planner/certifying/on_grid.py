@@ -31,6 +31,8 @@ class Proven:
         What no pair of the grid is below.
     pairs : int
         How many there are.
+    within_scale : bool
+        Whether that is said only of pairs by which the end of the scale cuts off no level.
     """
 
     value: float
@@ -38,6 +40,7 @@ class Proven:
     light: np.ndarray
     least: float
     pairs: int
+    within_scale: bool
 
     @classmethod
     def of(
@@ -49,11 +52,14 @@ class Proven:
         most: int,
         report: Report,
     ) -> Proven:
-        """Whether any pair is better than a start by a share; at most so many are evaluated."""
-        value = float(problem.values(*(pose[None] for pose in start))[0])
-        rows, columns, bound, beyond = _open(
-            PairBounds.of(problem, grid.sensors, grid.lights), value, share, most, report
-        )
+        """Whether any pair is better than a start by a share; at most so many are evaluated.
+
+        Where the end of the scale cuts off nothing from the start, what is cut off elsewhere does not count.
+        """
+        values_of, within = problem.values_from(*start), not problem.cuts_off(*start)
+        value = float(values_of(*(pose[None] for pose in start))[0])
+        bounds = PairBounds.of(problem, grid.sensors, grid.lights, within_scale=within)
+        rows, columns, bound, beyond = _open(bounds, value, share, most, report)
         best, lowest = (value, *start), np.inf
         for at in range(0, len(bound), _AT_ONCE):
             if bound[at] >= (1 - share) * best[0]:
@@ -61,13 +67,14 @@ class Proven:
                 break
             some = slice(at, at + _AT_ONCE)
             sensors, lights = grid.sensors[rows[some]], grid.lights[columns[some]]
-            values = problem.values(sensors, lights)
+            values = values_of(sensors, lights)
             k = int(np.argmin(values))
             lowest = min(lowest, float(values[k]))
             if values[k] < best[0]:
                 best = float(values[k]), sensors[k], lights[k]
             report("evaluating the pairs of the lowest bounds", min(at + _AT_ONCE, len(bound)), len(bound))
-        return cls(*best, min(lowest, beyond), len(grid.sensors) * len(grid.lights))
+        spared = within and bounds.lit.may_be_cut_off
+        return cls(*best, min(lowest, beyond), len(grid.sensors) * len(grid.lights), spared)
 
 
 def _open(
@@ -77,7 +84,7 @@ def _open(
     what no other pair is below."""
     seeing, beyond = np.flatnonzero(bounds.measures), np.inf
     found = np.zeros((0, 2), int), np.zeros(0, np.float32)
-    for done, (rows, bound) in enumerate(bounds.blocks(seeing)):
+    for done, (rows, bound) in enumerate(bounds.blocks(seeing, (1 - share) * value)):
         near = bound < (1 - share) * value
         beyond = min(beyond, float(np.where(near, np.inf, bound).min()))
         row, column = np.nonzero(near)

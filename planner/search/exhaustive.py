@@ -183,7 +183,7 @@ def _best_first(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray,
     """As pair by pair, but for pairs that bounds exclude: of sensors beyond `DEAREST` the least is a bound."""
     bounds = PairBounds.of(problem, sensors, lights)
     least, column = np.full((2, len(sensors)), np.inf), np.full((2, len(sensors)), -1)
-    for part, bound in bounds.blocks(np.arange(len(sensors))):
+    for part, bound in bounds.blocks(np.arange(len(sensors)), 0.0):
         least[:, part], column[:, part] = bound.min(1), bound.argmin(1)
     order, evaluated = np.argsort(least[0], kind="stable"), 0
     order = order[np.isfinite(least[0, order])]
@@ -192,7 +192,7 @@ def _best_first(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray,
         rows = order[at : at + _SENSORS]
         if not least[1, rows[0]] <= far:
             break
-        told, asked = _settled(problem, sensors[rows], lights, bounds.rows(rows), far)
+        told, asked = _settled(problem, sensors[rows], lights, bounds.rows(rows, far), far)
         least[:, rows], column[:, rows] = told.min(-1), told.argmin(-1)
         evaluated += asked
         report("evaluating pairs", at + len(rows), len(order))

@@ -147,13 +147,17 @@ class SearchProblem:
             yield part, self.errors(*both), self.feasible(*both)
             report("evaluating pairs", min(at + size, len(sensors)), len(sensors))
 
+    def cuts_off(self, sensor: np.ndarray, light: np.ndarray) -> bool:
+        """Whether the end of the scale cuts off levels of an edge, sensor (2,) and free lights (2 F,)."""
+        return bool(cut_off(self.errors(sensor[None], light[None]), self.scene)[0])
+
     def values_from(self, sensor: np.ndarray, light: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """What a local search from a setting minimises, of sensors (n, 2) and lights (n, 2 F): infinite where these do
         not keep the constraints, or where levels are cut off.
 
         The latter only if they are not cut off where it begins.
         """
-        anyway = cut_off(self.errors(sensor[None], light[None]), self.scene)[0]
+        anyway = self.cuts_off(sensor, light)
 
         def values(s: np.ndarray, k: np.ndarray) -> np.ndarray:
             found, allowed = np.full(len(s), np.inf), self.constraints.allowed(self.scene, s, k)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -28,7 +29,8 @@ from imaging.light.behind import things_behind
 from imaging.models.along import NODE_WEIGHTS, EdgeNodes, place_nodes
 from imaging.models.calibrated import POINT_WEIGHTS, POINTS, SHORT, line_slope, line_weight, point_variance, to_points
 from imaging.pictures import Pictures
-from planner.search.brightest import PIECES, Brightest, Look, brightest, is_bounded
+from planner.search.brightest import PIECES, Brightest, Lit, Look, is_bounded
+from planner.search.lobes import Lobes, together
 from planner.search.objective import Aim, SearchProblem
 from scenes import Edge, Scene
 from scenes.measurands.form import forms_of
@@ -36,6 +38,8 @@ from scenes.measurands.kinds import MEASURANDS
 
 _ROWS = 256  # sensors at a time
 _WAYS = 16  # of what is past an edge's face that are told apart; all others are one
+_APART, _NEAR = 0.2, 0.04  # between directions of sensors that are taken together, each way: roughly, and once more
+_PARTS = 4  # of an edge, where its gloss is looked at once more
 _MARGIN = 1e-5  # relative; single precision in sums of some 20 terms of one sign
 
 
@@ -48,8 +52,10 @@ class PairBounds:
     problem : SearchProblem
     poses : tuple of ndarray, shape (S, 2), (L, 2 F)
         Sensors and lights, degrees.
-    lights : list of Brightest
-        Of each edge.
+    lit : Lit
+        What the lights do to edges.
+    group : ndarray of int, shape (S,)
+        Sensors that glossy faces are looked at by from nearly the same side (`together`).
     measures : ndarray of bool, shape (S,)
         Which sensors see all edges that are needed; the others measure under no light.
     needs : ndarray of bool, shape (M, E)
@@ -62,20 +68,26 @@ class PairBounds:
         By how much each piece's ratio counts, 1 together.
     loss : ndarray, shape (S, M, E)
         What is lost of it for each time that the ratio is uneven, less the first.
+    within_scale : bool
+        Whether they hold only of pairs by which no level is cut off at the end of the scale.
     """
 
     problem: SearchProblem
     poses: tuple[np.ndarray, np.ndarray]
-    lights: list[Brightest]
+    lit: Lit
+    group: np.ndarray
     measures: np.ndarray
     needs: np.ndarray
     look: np.ndarray
     amount: np.ndarray
     weights: np.ndarray
     loss: np.ndarray
+    within_scale: bool = False
 
     @classmethod
-    def of(cls, problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray) -> PairBounds:
+    def of(
+        cls, problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, *, within_scale: bool = False
+    ) -> PairBounds:
         """Of sensors (S, 2) and lights (L, 2 F), degrees."""
         scene, aim = problem.scene, problem.objective
         pictures = Pictures.of(scene, sensors)
@@ -94,46 +106,85 @@ class PairBounds:
         return cls(
             problem=problem,
             poses=(sensors, lights),
-            lights=brightest(scene, looks, lights),
+            lit=Lit.of(scene, looks, lights),
+            group=together(scene, sensors, _APART),
             measures=(seen | ~needs.any(0)).all(-1),
             needs=needs,
             look=look,
             amount=amount.astype(np.float32),
             weights=weights.astype(np.float32),
             loss=loss.astype(np.float32),
+            within_scale=within_scale,
         )
 
-    def blocks(self, which: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def blocks(self, which: np.ndarray, below: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Some of the sensors ``which`` at a time, and their `rows`."""
+        which = which[np.argsort(self.group[which], kind="stable")]
         for at in range(0, len(which), _ROWS):
-            yield which[at : at + _ROWS], self.rows(which[at : at + _ROWS])
+            yield which[at : at + _ROWS], self.rows(which[at : at + _ROWS], below)
 
-    def rows(self, which: np.ndarray) -> np.ndarray:
-        """Bounds of some sensors with all lights, (n, L); infinite where nothing can be measured, or is not allowed."""
+    def rows(self, which: np.ndarray, below: float) -> np.ndarray:
+        """Bounds of some sensors with all lights, (n, L); infinite where nothing can be measured, or is not allowed.
+
+        Where gloss counts, rough ones of sensors together, and nearer ones of those pairs of which they are below a
+        number.
+        """
         sensors, lights = self.poses
-        found = self.problem.objective.joined(self._quantity(which, m) for m in range(self.amount.shape[1]))
-        allowed = self.problem.feasible(sensors[which, None], lights[None])
-        return np.where(self.measures[which, None] & allowed, found, np.inf)
+        found = np.full((len(which), len(lights)), np.inf, np.float32)
+        sees = np.flatnonzero(self.measures[which])
+        for group in np.unique(self.group[which[sees]]):
+            some = sees[self.group[which[sees]] == group]
+            found[some] = self._together(which[some], below)
+        return np.where(self.problem.feasible(sensors[which, None], lights[None]), found, np.inf)
 
-    def _quantity(self, which: np.ndarray, m: int) -> np.ndarray:
+    def _together(self, which: np.ndarray, below: float) -> np.ndarray:
+        """Of some sensors of one group, (n, L)."""
+        if self._matt is not None:
+            return self._joined(which, self._matt)
+        found = self._joined(which, self._seen(which, self.lit, 1))
+        left = found < below
+        nearer = together(self.lit.scene, self.poses[0][which], _NEAR)
+        for group in np.unique(nearer[left.any(1)]):
+            rows = np.flatnonzero((nearer == group) & left.any(1))
+            lights = np.flatnonzero(left[rows].any(0))
+            seen = self._seen(which[rows], self.lit.some(lights), _PARTS)
+            pairs = np.ix_(rows, lights)
+            found[pairs] = np.maximum(found[pairs], self._joined(which[rows], seen))
+        return found
+
+    @cached_property
+    def _matt(self) -> Brightest | None:
+        """What all sensors see at most; None where that depends on where they stand."""
+        matt = self.lit.scene.surfaces.is_diffuse
+        return self._seen(np.zeros(1, int), self.lit, 1) if matt else None
+
+    def _seen(self, which: np.ndarray, lit: Lit, pieces: int) -> Brightest:
+        """What some sensors see at most, edges in so many pieces."""
+        return Brightest(lit, Lobes(lit.scene, lit.shining, self.poses[0][which]), self.within_scale, pieces)
+
+    def _joined(self, which: np.ndarray, brightest: Brightest) -> np.ndarray:
+        return self.problem.objective.joined(self._quantity(which, m, brightest) for m in range(self.amount.shape[1]))
+
+    def _quantity(self, which: np.ndarray, m: int, brightest: Brightest) -> np.ndarray:
         """The part of one quantity, (n, L)."""
-        found = np.zeros((len(which), len(self.poses[1])), np.float32)
+        found = np.zeros((len(which), len(brightest.lit)), np.float32)
         for e in np.flatnonzero(self.needs[m]):
             for way in np.unique(self.look[which, e]):
                 rows = np.flatnonzero(self.look[which, e] == way)
-                found[rows] += self._edge(which[rows], m, e, way)
+                found[rows] += self._edge(which[rows], m, e, *brightest.of(e, way))
         return found
 
-    def _edge(self, which: np.ndarray, m: int, e: int, way: int) -> np.ndarray:
+    def _edge(self, which: np.ndarray, m: int, e: int, ratio: np.ndarray, uneven: np.ndarray) -> np.ndarray:
         """What an edge adds, (n, L)."""
-        ratio = self.weights[which, m, e] @ self.lights[e].ratio[way].T
-        left = 1 - self.loss[which, m, e, None] * (self.lights[e].uneven[way] - 1)
+        most = self.weights[which, m, e] @ ratio.T
+        left = 1 - self.loss[which, m, e, None] * (uneven - 1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(ratio > 0, self.amount[which, m, e, None] * np.maximum(left, 0) / ratio, np.inf)
+            return np.where(most > 0, self.amount[which, m, e, None] * np.maximum(left, 0) / most, np.inf)
 
 
 def has_pair_bounds(scene: Scene, model: str) -> bool:
-    """Whether any of a scene's quantities has a bound: matt faces, points of light, a known place, lines."""
+    """Whether any of a scene's quantities has a bound: faces without print, points of light, a known place,
+    lines."""
     lines = straight(scene) and _is_linear(scene).any()
     return bool(model == "calibrated" and scene.placement.is_known and lines and is_bounded(scene))
 

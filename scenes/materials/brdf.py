@@ -10,6 +10,7 @@ import numpy as np
 from scenes.materials.vectors import NUMPY, Ops, Vector, across, components, dot
 from scenes.model import Model
 
+Interval = tuple[Any, Any]
 Curves = Iterable[tuple[tuple[float, float], ...]]
 
 
@@ -25,8 +26,8 @@ class Brdf(Model):
     """How a surface reflects light, the same in the image model and in the renderer.
 
     A new kind is a class in one file, made known by ``@MATERIALS.add(name)``: its fields and `lambertian`; `dull`,
-    `lobe`, `lobe_reflectance`, `lobe_slope` and `matt` where it has a lobe; `dispersion`, `with_dispersion` and
-    `indices` where that changes with the wavelength.
+    `lobe`, `lobe_range`, `lobe_reflectance`, `lobe_slope` and `matt` where it has a lobe; `dispersion`,
+    `with_dispersion` and `indices` where that changes with the wavelength.
     """
 
     kind: str
@@ -77,6 +78,30 @@ class Brdf(Model):
         Written with ``ops`` and `scenes.materials.vectors`, it serves NumPy and the renderer alike.
         """
         raise NotImplementedError
+
+    def lobe_range(
+        self,
+        index: tuple[Index, ...],
+        lean: Interval,
+        facing: Interval,
+        light_cosine: Interval,
+        sensor_cosine: Interval,
+        polarised: tuple[bool, bool],
+    ) -> Interval:
+        """What `lobe` is not below, and what it is not above, of directions that are known to bounds; 0 and infinite of
+        a kind that does not say.
+
+        Parameters
+        ----------
+        lean : pair of array
+            Angles between N and the half vector of L and V, radians, the least and the greatest.
+        facing, light_cosine, sensor_cosine : pair of array
+            Cosines between V and the half vector, N.L, and N.V, the least and the greatest.
+        polarised : pair of bool
+            Whether the light is, and whether there is an analyser.
+        """
+        none = np.zeros(np.shape(lean[0]))
+        return none, none if self.is_diffuse else none + np.inf
 
     def matt(self) -> Self:
         """The same without a lobe, its Lambertian part as it is."""

@@ -122,11 +122,11 @@ def test_a_certificate_of_a_small_range_and_a_better_place():
     assert not short.certificate.proved
 
 
-@pytest.mark.parametrize("name", ["printed_label", "glossy_metal", "two_lights"])
+@pytest.mark.parametrize("name", ["printed_label", "ring_light", "two_lights"])
 def test_other_scenes_are_refused(name):
-    """Printed, glossy, of two free lights: there are no bounds."""
+    """Printed, under a light of some size, of two free lights: there are no bounds."""
     plan = planner.plan(scenes.load("task1"), constraints=NEAR, step_deg=3, refined=False)
-    with pytest.raises(InvalidInput, match="scene must be of matt parts without print"):
+    with pytest.raises(InvalidInput, match="scene must be of plane faces without print"):
         planner.certified(replace(plan, scene=scenes.load(name)), NEAR)
 
 
