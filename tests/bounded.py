@@ -68,7 +68,7 @@ def all_values(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray) 
 def searched_values(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray) -> np.ndarray:
     """The same, infinite where the search takes levels to be cut off at the end of the scale, if any pair is left."""
     values = all_values(problem, sensors, lights)
-    cut = cut_off(problem.errors(sensors[:, None], lights[None]), problem.scene)
+    cut = cut_off(problem.errors(sensors[:, None], lights[None]))
     within = np.where(cut, np.inf, values)
     return within if np.isfinite(within).any() else values
 

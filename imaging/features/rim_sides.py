@@ -126,7 +126,7 @@ def contrast_along(
     sides = _sides_at(pictures, circle, angle, fall_off)
     if not fall_off:
         return (sides[..., 0, :] - sides[..., 1, :]) ** 2, pictures.scene.noise.variance
-    return of_sides(pictures.scene, sides)
+    return of_sides(pictures.scene, sides)[:2]
 
 
 def seen_along(pictures: Pictures, circle: Circle, angle: np.ndarray) -> np.ndarray:

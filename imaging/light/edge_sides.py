@@ -22,11 +22,13 @@ from scenes.viewpoint import Viewpoint
 class EdgeContrast(NamedTuple):
     """Squared difference of the recorded levels on both sides, and the mean variance of the noise there; (..., E, n).
 
-    An edge locator's kernel is even across the edge, so it sees the mean of both sides' noise.
+    An edge locator's kernel is even across the edge, so it sees the mean of both sides' noise. ``uncut_variance`` is
+    what that would be if the scale had no end.
     """
 
     squared: np.ndarray
     noise_variance: np.ndarray | float
+    uncut_variance: np.ndarray | float
 
 
 def side_signals(
@@ -75,10 +77,11 @@ def edge_contrast(pictures: Pictures, names: tuple[str, ...], fractions: np.ndar
 def of_sides(scene: Scene, sides: np.ndarray) -> EdgeContrast:
     """Recorded contrast and noise from the signals (..., 2, n) of both sides, shape (..., n)."""
     if scene.noise.gain == 0 and not (sides > sensor.headroom(scene.noise)).any():  # NaN of one picture is its own
-        return EdgeContrast((sides[..., 0, :] - sides[..., 1, :]) ** 2, scene.noise.variance)
+        return EdgeContrast((sides[..., 0, :] - sides[..., 1, :]) ** 2, *[scene.noise.variance] * 2)
     found = sensor.recorded(scene.noise, scene.noise.dark_level + sides)
     squared = (found.level[..., 0, :] - found.level[..., 1, :]) ** 2
-    return EdgeContrast(squared, found.noise_variance.mean(-2))
+    uncut = scene.noise.variance + sensor.shot_noise(scene.noise, sides)
+    return EdgeContrast(squared, found.noise_variance.mean(-2), uncut.mean(-2))
 
 
 def _separable_contrast(scene: Scene, strength: np.ndarray, r2: np.ndarray) -> EdgeContrast:
@@ -88,12 +91,12 @@ def _separable_contrast(scene: Scene, strength: np.ndarray, r2: np.ndarray) -> E
     if scene.noise.gain == 0:
         special = np.broadcast_to(strength.max(-1) > sensor.headroom(scene.noise) * r2.min(-1) ** 1.5, special.shape)
     if not special.any():
-        return EdgeContrast(squared, scene.noise.variance)
-    noise = np.full(squared.shape, scene.noise.variance)
+        return EdgeContrast(squared, *[scene.noise.variance] * 2)
+    noise, uncut = np.full((2, *squared.shape), scene.noise.variance)
     sides = np.broadcast_to(strength, (*special.shape, 2))[special][..., None]
     sides = sides / np.broadcast_to(r2, squared.shape)[special][:, None] ** 1.5
-    squared[special], noise[special] = of_sides(scene, sides)
-    return EdgeContrast(squared, noise)
+    squared[special], noise[special], uncut[special] = of_sides(scene, sides)
+    return EdgeContrast(squared, noise, uncut)
 
 
 def paper_contrast2(pictures: Pictures, names: tuple[str, ...], fractions: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from imaging.pictures import Pictures
 from scenes import Edge
 
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(16)
+_UNCUT = 0.98  # of the noise's variance without an end of the scale: below, that has cut it off
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,17 +55,25 @@ class EdgeNodes:
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """Nodes, and the squared contrast and the noise's variance there, (..., E, n) each."""
+    """Nodes, and the squared contrast and the noise's variance there, with the end of the scale and without, each
+    (..., E, n)."""
 
     measurands: Measurands
     nodes: EdgeNodes
     squared: np.ndarray
     noise_variance: np.ndarray | float
+    uncut_variance: np.ndarray | float
 
     @classmethod
     def of(cls, pictures: Pictures, *, trimmed: bool) -> Along:
         """Found once for each set of pictures."""
         return pictures.once(("along", trimmed), lambda: cls._of(pictures, trimmed))
+
+    @property
+    def cut_off(self) -> np.ndarray:
+        """Of which edges the end of the scale has cut off levels, bool (..., E): it makes their noise less."""
+        noise, uncut = (np.mean(each * np.ones(1), -1) for each in (self.noise_variance, self.uncut_variance))
+        return np.broadcast_to(noise < _UNCUT * uncut, self.squared.shape[:-1])
 
     @classmethod
     def _of(cls, pictures: Pictures, trimmed: bool) -> Along:

@@ -204,7 +204,7 @@ def bound(pictures: Pictures) -> Errors:
         return a * a * lines[..., 0, 0] + 2 * a * b * lines[..., 0, 1] + b * b * lines[..., 1, 1]
 
     joint = variances, variances_object
-    return Errors(known, line_variance, alone.contrast, alone.noise_variance, (), (), joint=joint)
+    return Errors(known, line_variance, alone.contrast, alone.noise_variance, alone.cut_off, (), (), joint=joint)
 
 
 def _of_raw(scene: Scene) -> Scene:

@@ -71,7 +71,8 @@ def _calibrated(pictures: Pictures) -> Errors:
             shared = of_points(noise, circle.place, circle.normal, circle.arc, circle.blur, scale)
         return calibrated_circle(circle, located_kappa2(scale, circle.blur), scale, MIN_CONTRAST**2, shared)
 
-    return combined(pictures, _quadratic(line_variance, nodes), squared.mean(-1), noise.mean(-1), found)
+    variance = _quadratic(line_variance, nodes)
+    return combined(pictures, variance, squared.mean(-1), noise.mean(-1), found, cut_off=along.cut_off)
 
 
 def _quadratic(variance: LineVariance, nodes: EdgeNodes) -> LineVariance:

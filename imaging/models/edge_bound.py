@@ -33,4 +33,4 @@ def edge_bound(pictures: Pictures) -> Errors:
         return fisher_circle(circle, density * circle.arc, None)
 
     noise = np.mean(along.noise_variance * np.ones(1), -1)
-    return combined(pictures, line_variance, along.squared.mean(-1), noise, found)
+    return combined(pictures, line_variance, along.squared.mean(-1), noise, found, cut_off=along.cut_off)

@@ -42,6 +42,8 @@ class Errors:
         Root mean square contrast along each straight edge, grey levels.
     noise_variance : ndarray, shape (..., E)
         Mean variance of the noise along each straight edge, grey levels^2.
+    cut_off : ndarray of bool, shape (..., E)
+        Whether the end of the sensor's scale has cut off levels of each straight edge.
     circles : tuple of ndarray, shape (..., p, p)
         Covariance of each circle's three parameters, or a cone's four, the scene's unit squared; infinite diagonal
         where it cannot be found.
@@ -59,6 +61,7 @@ class Errors:
     line_variance: LineVariance
     contrast: np.ndarray
     noise_variance: np.ndarray
+    cut_off: np.ndarray
     circles: tuple[np.ndarray, ...]
     crowded: tuple[np.ndarray, ...]
     left: tuple[np.ndarray, ...] = ()
@@ -185,6 +188,7 @@ def combined(
     noise_variance: np.ndarray | float,
     circle_covariance: Callable[[RimImage], np.ndarray],
     *,
+    cut_off: np.ndarray | bool = False,
     fall_off: bool = True,
 ) -> Errors:
     """From the lines' and the circles' errors to those of all quantities."""
@@ -192,11 +196,11 @@ def combined(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         rims = [_outline(pictures, solid.round(name), fall_off) for name in known.circles]
         circles = tuple(circle_covariance(each) for each in rims)
-    noise = np.broadcast_to(noise_variance, contrast2.shape)
+    noise, cut_off = (np.broadcast_to(each, contrast2.shape) for each in (noise_variance, cut_off))
     crowded = tuple(each.crowded for each in rims)
     left = tuple(each.left for each in rims)
     forms = form_variances(pictures, known, rims)
-    return Errors(known, line_variance, np.sqrt(contrast2), noise, circles, crowded, left, forms)
+    return Errors(known, line_variance, np.sqrt(contrast2), noise, cut_off, circles, crowded, left, forms)
 
 
 def _outline(pictures: Pictures, each: Circle | Curved, fall_off: bool) -> RimImage:

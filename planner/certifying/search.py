@@ -134,7 +134,7 @@ class Search:
         if not len(best):
             return
         values = np.where(problem.constraints.allowed(problem.scene, s, k), problem.values(s, k), np.inf)
-        values = np.where(cut_off(problem.errors(s, k), problem.scene), np.inf, values)
+        values = np.where(cut_off(problem.errors(s, k)), np.inf, values)
         i = int(np.argmin(values))
         if values[i] < found.value:
             self.found = replace(found, value=float(values[i]), sensor=s[i], light=k[i])

@@ -218,7 +218,7 @@ def _best_light(problem: Problem, settings: Settings, view: Viewed) -> Rated | N
         return None
     errors = variance_model("calibrated")(Pictures.of(scene, sensor[None], by_light(lights) if scene.free else ()))
     limits = Constraints(light_out_of_view=True, min_separation_deg=_APART_DEG)
-    possible = limits.pairs(scene, sensor, lights) & ~cut_off(errors, scene)
+    possible = limits.pairs(scene, sensor, lights) & ~cut_off(errors)
     noise = np.broadcast_to(errors.variances_object, (len(lights), len(problem.allowed)))
     ratios = np.where(possible, limit_ratio(problem, noise + view.systematic).max(-1), np.inf)
     i = int(ratios.argmin())

@@ -10,7 +10,7 @@ r^6 itself, and with shot noise in r^3, too. All are then, edge by edge, a sum o
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -112,7 +112,18 @@ def best_pair(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, r
 
 
 def _by_bound(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report) -> BestPair:
-    table = separable(problem.scene, sensors, lights, problem.model, problem.objective)
+    """Of all pairs; where the end of the scale cuts off levels by the best, of those by which no level is near it."""
+    found = _bounded(problem, sensors, lights, report, within_scale=False)
+    if found.sensor < 0 or not problem.cuts_off(sensors[found.sensor], lights[found.light]):
+        return found
+    within = _bounded(problem, sensors, lights, report, within_scale=True)
+    return found if within.sensor < 0 else replace(within, within_scale=True)
+
+
+def _bounded(
+    problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, report: Report, *, within_scale: bool
+) -> BestPair:
+    table = separable(problem.scene, sensors, lights, problem.model, problem.objective, within_scale=within_scale)
     least, column = np.full(len(sensors), np.inf), np.full(len(sensors), -1)
     done, whole = 0, 2 * len(table.sensors)
     for rows, which, bound in _blocks(table, problem, sensors, lights):
@@ -161,7 +172,7 @@ def _one_by_one(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray,
     seeing = np.flatnonzero(_seeing(problem.scene, sensors))
     for part, errors, allowed in problem.table(sensors[seeing], lights, report):
         values = np.where(allowed, minimised(errors, problem.objective), np.inf)
-        for k, some in enumerate((values, np.where(cut_off(errors, problem.scene), np.inf, values))):
+        for k, some in enumerate((values, np.where(cut_off(errors), np.inf, values))):
             column[k, seeing[part]] = some.argmin(1)
             least[k, seeing[part]] = some.min(1)
     pairs = len(sensors) * len(lights)
@@ -218,7 +229,7 @@ def _settled(
             columns = some[at : at + _LIGHTS]
             errors = problem.errors(sensors[:, None], lights[None, columns])
             values = np.where(np.isfinite(bound[:, columns]), minimised(errors, problem.objective), np.inf)
-            told[:, :, columns] = values, np.where(cut_off(errors, problem.scene), np.inf, values)
+            told[:, :, columns] = values, np.where(cut_off(errors), np.inf, values)
         asked[some] = True
         known = np.where(asked, told[1], np.inf).min(1, keepdims=True)
         wanted = bound <= known
@@ -295,7 +306,9 @@ class Separable:
         return self.aim.joined(bounds)
 
 
-def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, aim: Aim | str) -> Separable:
+def separable(
+    scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str, aim: Aim | str, *, within_scale: bool = False
+) -> Separable:
     """Set up the bound for a separable scene and quantities of straight edges.
 
     Parameters
@@ -304,6 +317,8 @@ def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str,
         Poses, degrees.
     model : {"paper", "calibrated"}
     aim : Aim, or objective of one quantity
+    within_scale : bool
+        Whether lights that bring a level near the end of the scale are left out.
     """
     pictures, aim = Pictures.of(scene, sensors), Aim.of(scene.quantities, aim)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -318,13 +333,15 @@ def separable(scene: Scene, sensors: np.ndarray, lights: np.ndarray, model: str,
     seen = facing(scene.solid, pictures.viewpoint[good])
     kinds, classes = np.unique(seen, axis=0, return_inverse=True)
     first = [int(np.flatnonzero(good)[np.argmax(classes == k)]) for k in range(len(kinds))]
-    strength = [_strengths(scene, known.view.names, sensors[k], lights, model) for k in first]
+    strength = [_strengths(scene, known.view.names, sensors[k], lights, model, within_scale) for k in first]
     return Separable(
         np.flatnonzero(good), classes.ravel(), (sensor_part * slack)[good], light_part, np.array(strength), aim
     )  # fmt: skip
 
 
-def _strengths(scene: Scene, names: tuple[str, ...], sensor: np.ndarray, lights: np.ndarray, model: str) -> np.ndarray:
+def _strengths(
+    scene: Scene, names: tuple[str, ...], sensor: np.ndarray, lights: np.ndarray, model: str, within_scale: bool
+) -> np.ndarray:
     """1 / K^2 of each edge and, for the calibrated model, (K_1 + K_2) / K^2 / 2: shape (L, E, 1 or 2), 0 for none.
 
     With K_1 / r^3 and K_2 / r^3 the sides' signals, K their difference, the noise over the squared contrast is
@@ -338,16 +355,19 @@ def _strengths(scene: Scene, names: tuple[str, ...], sensor: np.ndarray, lights:
             sides = side_strengths(pictures, names)
             kinds = [np.ones(sides.shape[:-1]), sides.sum(-1) / 2][: 2 if scene.noise.gain > 0 else 1]
             inverse = np.stack(kinds, -1) / (sides[..., :1] - sides[..., 1:]) ** 2
-            inverse *= _cut_off(scene, sides, edge_distance2(pictures, names, np.linspace(0, 1, 9)))[..., None]
+            r2 = edge_distance2(pictures, names, np.linspace(0, 1, 9))
+            inverse *= _cut_off(scene, sides, r2, within_scale)[..., None]
     return np.where(np.isfinite(inverse).all(-1, keepdims=True), inverse, 0.0)
 
 
-def _cut_off(scene: Scene, sides: np.ndarray, r2: np.ndarray) -> np.ndarray:
+def _cut_off(scene: Scene, sides: np.ndarray, r2: np.ndarray, within_scale: bool) -> np.ndarray:
     """Least factor by which the end of the scale changes noise over squared contrast along an edge, (L, E); 1 mostly.
 
-    The factor is smooth along an edge: 9 points and 2 % to spare.
+    The factor is smooth along an edge: 9 points and 2 % to spare. Infinite ``within_scale`` of what is near the end.
     """
     hot = sides.max(-1) > 0.99 * headroom(scene.noise) * r2.min(-1) ** 1.5
+    if within_scale:
+        return np.where(hot, np.inf, 1.0)
     factor = np.ones(hot.shape)
     signals = sides[hot][..., None] / r2[hot][:, None] ** 1.5
     found = of_sides(scene, signals)

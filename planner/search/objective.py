@@ -27,7 +27,6 @@ DEFAULT_OBJECTIVE: Objective = "object"
 DEFAULT_OVER: Over = "minimax"
 _PAIRS = 8192  # evaluated at a time, and ...
 _TABLE = 20_000  # ... of a table of all sensors and lights
-_UNCUT = 0.98  # of the noise's variance in darkness: below, the end of the scale has cut it off
 
 Report = Callable[[str, int, int], None]
 
@@ -149,7 +148,7 @@ class SearchProblem:
 
     def cuts_off(self, sensor: np.ndarray, light: np.ndarray) -> bool:
         """Whether the end of the scale cuts off levels of an edge, sensor (2,) and free lights (2 F,)."""
-        return bool(cut_off(self.errors(sensor[None], light[None]), self.scene)[0])
+        return bool(cut_off(self.errors(sensor[None], light[None]))[0])
 
     def values_from(self, sensor: np.ndarray, light: np.ndarray) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """What a local search from a setting minimises, of sensors (n, 2) and lights (n, 2 F): infinite where these do
@@ -163,7 +162,7 @@ class SearchProblem:
             found, allowed = np.full(len(s), np.inf), self.constraints.allowed(self.scene, s, k)
             if allowed.any():
                 errors = self.errors(s[allowed], k[allowed])
-                cut = cut_off(errors, self.scene) & ~anyway
+                cut = cut_off(errors) & ~anyway
                 found[allowed] = np.where(cut, np.inf, minimised(errors, self.objective))
             return found
 
@@ -185,12 +184,12 @@ def minimised(errors: Errors, objective: str | Aim) -> np.ndarray:
     return aim(errors.variances if aim.unit == "image" else errors.variances_object + errors.placed)
 
 
-def cut_off(errors: Errors, scene: Scene) -> np.ndarray:
+def cut_off(errors: Errors) -> np.ndarray:
     """In which pictures (...) the end of the scale has cut off levels of an edge.
 
     What is cut off scatters less, so that a plain minimum is led to where every measurement is biased.
     """
-    return (errors.noise_variance < _UNCUT * scene.noise.variance).any(-1)
+    return errors.cut_off.any(-1)
 
 
 def check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:

@@ -37,7 +37,7 @@ def fast_table(
     for ``uncut``, where levels are cut off: what is cut off scatters less, and every measurement of it is biased."""
     told = np.empty((len(sensors), len(lights), len(problem.scene.quantities)))
     for part, errors, allowed in problem.table(sensors, lights, report):
-        good = allowed & ~cut_off(errors, problem.scene) if uncut else allowed
+        good = allowed & ~cut_off(errors) if uncut else allowed
         told[part] = information(errors.variances_object, problem.objective) * good[..., None]
     return told
 

@@ -200,7 +200,7 @@ class Variation:
         """What is minimised of pairs (n, 2), and where the end of the scale has cut levels off; shape (n,) each."""
         world = self._with(choice)
         found = world.errors(sensors, lights)
-        return minimised(found, world.objective), cut_off(found, world.scene)
+        return minimised(found, world.objective), cut_off(found)
 
     def _lowest(self, found: list[Place], known: Place, most: int, starts: int, **free: bool) -> Place:
         """The lowest place to which a descent leads from the best ones that can be trusted; ``known`` at worst."""

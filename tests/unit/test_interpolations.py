@@ -47,7 +47,7 @@ def test_the_end_of_the_scale_never_raises_what_a_search_may_rely_on(levels, tas
     """The least factor of noise over squared contrast along an edge: 1 at the most, a little less where it is less."""
     sides, r2 = np.array(levels) * 1e6 * np.ones((1, 1, 2)), np.full((1, 1, 9), 1e4)
     with np.errstate(divide="ignore"):  # of no contrast
-        found = float(_cut_off(task1, sides, r2)[0, 0])
+        found = float(_cut_off(task1, sides, r2, False)[0, 0])
     told, noise = recorded(task1.noise, task1.noise.dark_level + np.array(levels)), task1.noise
     with np.errstate(divide="ignore"):
         ratio = told.noise_variance.mean() / np.diff(told.level)[0] ** 2 * np.diff(levels)[0] ** 2 / noise.variance
