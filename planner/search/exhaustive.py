@@ -103,8 +103,8 @@ def best_pair(problem: SearchProblem, sensors: np.ndarray, lights: np.ndarray, r
     """The best of all pairs of sensors (S, 2) and lights (L, 2 F), degrees; F lights are free.
 
     For a convex diffuse solid a rigorous lower bound of every pair is one matrix product; only pairs whose bound does
-    not exceed the best variance known are evaluated. So it is, by a bound that is less near, of other matt parts under
-    points of light (`pair_bounds`). Otherwise every pair is evaluated.
+    not exceed the best variance known are evaluated. So it is, by a bound that is less near, of other parts of plane
+    faces under points of light (`pair_bounds`). Otherwise every pair is evaluated.
     """
     search = _best_first if has_pair_bounds(problem.scene, problem.model) else _one_by_one
     search = _by_bound if has_bound(problem.scene, problem.model) else search

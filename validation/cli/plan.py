@@ -117,8 +117,8 @@ class Options:
         typer.Option(
             "--certify",
             help=(
-                "Prove that no pose at all is better by over 1 % (a matt convex part, a point light); of other matt "
-                "parts, none of a 1 degree grid, or by how much."
+                "Prove that no pose at all is better by over 1 % (a matt convex part, a point light); of other parts "
+                "of plane faces, none of a 1 degree grid, or by how much."
             ),
         ),
     ] = False
