@@ -77,7 +77,8 @@ def edge_contrast(pictures: Pictures, names: tuple[str, ...], fractions: np.ndar
 def of_sides(scene: Scene, sides: np.ndarray) -> EdgeContrast:
     """Recorded contrast and noise from the signals (..., 2, n) of both sides, shape (..., n)."""
     if scene.noise.gain == 0 and not (sides > sensor.headroom(scene.noise)).any():  # NaN of one picture is its own
-        return EdgeContrast((sides[..., 0, :] - sides[..., 1, :]) ** 2, *[scene.noise.variance] * 2)
+        squared = (sides[..., 0, :] - sides[..., 1, :]) ** 2
+        return EdgeContrast(squared, scene.noise.variance, scene.noise.variance)
     found = sensor.recorded(scene.noise, scene.noise.dark_level + sides)
     squared = (found.level[..., 0, :] - found.level[..., 1, :]) ** 2
     uncut = scene.noise.variance + sensor.shot_noise(scene.noise, sides)
@@ -91,7 +92,7 @@ def _separable_contrast(scene: Scene, strength: np.ndarray, r2: np.ndarray) -> E
     if scene.noise.gain == 0:
         special = np.broadcast_to(strength.max(-1) > sensor.headroom(scene.noise) * r2.min(-1) ** 1.5, special.shape)
     if not special.any():
-        return EdgeContrast(squared, *[scene.noise.variance] * 2)
+        return EdgeContrast(squared, scene.noise.variance, scene.noise.variance)
     noise, uncut = np.full((2, *squared.shape), scene.noise.variance)
     sides = np.broadcast_to(strength, (*special.shape, 2))[special][..., None]
     sides = sides / np.broadcast_to(r2, squared.shape)[special][:, None] ** 1.5
