@@ -86,7 +86,7 @@ def test_pair_by_pair_the_least_of_each_sensor_is_told():
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(exhaustive, "_seeing", lambda scene, sensors: np.ones(len(sensors), bool))
             patch.setattr(exhaustive, "minimised", lambda errors, aim: errors.values)
-            patch.setattr(exhaustive, "cut_off", lambda errors, scene: errors.cut)
+            patch.setattr(exhaustive, "cut_off", lambda errors: errors.cut)
             problem = SimpleNamespace(table=table, objective=None, scene=None)
             return exhaustive._one_by_one(problem, np.zeros((4, 2)), np.zeros((4, 2)), None)
 
