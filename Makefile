@@ -2,6 +2,8 @@
 VENV ?= .venv
 PYTHON ?= python3
 BIN = $(VENV)/bin
+# Compiled files are kept, also where the environment says not to: the tests start hundreds of processes.
+export PYTHONDONTWRITEBYTECODE =
 
 .PHONY: validate test test-all machines machines-all margins fuzz mutants lint docs pages bench-measure bench-planner bench-cost reference proof agreement crowded clean
 
