@@ -17,6 +17,7 @@ from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.exchange import Exchange, Exchanged, Hits
 from imaging.light.irradiance import beam
+from imaging.light.places import shifts
 from scenes import Circle, Scene, Solid
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ def _from_outside(bore: Bore, exchange: Exchange) -> tuple[Hits, Hits]:
     found = []
     for depth in ((np.arange(_DEEP) + 0.5) / _DEEP, _form_factors(bore.rim.radius / bore.length)[2]):
         points, normals = (part.reshape(-1, 3) for part in _on_wall(bore, depth * bore.length))
-        found.append(exchange.met(points, normals, _rays(exchange)))
+        found.append(exchange.met(points, normals, _rays(exchange), shifts(len(points))))
     return found[0], found[1]
 
 

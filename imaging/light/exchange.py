@@ -27,7 +27,7 @@ from imaging.light.emitters import Emitter
 from imaging.light.irradiance import beam
 from imaging.light.kept import kept
 from imaging.light.nodes import Frame, along, frame_of, goes_on, onto
-from imaging.light.places import Places, areas_of, in_unit_square, middles_of, of_sequence, ways_about
+from imaging.light.places import Places, areas_of, in_unit_square, middles_of, shift_of, shifts, ways_about
 from scenes import Circle, Floor, Scene, Solid
 from scenes.parts.shading import normals_at
 from scenes.parts.solid import assembled
@@ -137,7 +137,7 @@ class Exchange:
         from scipy.sparse import csr_matrix  # slow to load, and rarely needed
 
         rays, count = _ROUGH_RAYS if self.roughly else _RAYS, self.tree.n
-        met = self.met(self.places.points, self.places.normals, rays, in_unit_square(len(self.places.points)))
+        met = self.met(self.places.points, self.places.normals, rays, shifts(len(self.places.points)))
         patches = self.patches[met.starts]
         return csr_matrix((1 / (rays * np.bincount(self.patches)[patches]), (patches, met.patches)), (count, count))
 
@@ -150,16 +150,16 @@ class Exchange:
         patches = self.tree.query(_placed(more.points, more.normals, self.scale))[1]
         return self.places.joined(more), np.concatenate([self.patches, patches])
 
-    def met(self, points: np.ndarray, normals: np.ndarray, rays: int, shifts: np.ndarray = np.zeros(2)) -> Hits:
+    def met(self, points: np.ndarray, normals: np.ndarray, rays: int, shifted: np.ndarray = np.zeros(2)) -> Hits:
         """What so many rays from each of points (n, 3) of unit normals meet.
 
-        Others with other ``shifts`` of the unit square that they stand for, (2,) or (n, 2).
+        Others where the unit square that they stand for is ``shifted`` otherwise, (2,) or (n, 2).
         """
-        size, shifts = max(1, _AT_ONCE // rays), np.broadcast_to(shifts, (len(points), 2))
+        size, shifted = max(1, _AT_ONCE // rays), np.broadcast_to(shifted, (len(points), 2))
         parts = []
         for at in range(0, len(points), size):
             part = slice(at, at + size)
-            found = self._met(points[part], normals[part], (in_unit_square(rays) + shifts[part, None]) % 1.0)
+            found = self._met(points[part], normals[part], (in_unit_square(rays) + shifted[part, None]) % 1.0)
             parts.append(found._replace(starts=found.starts + at))
         return Hits(*map(np.concatenate, zip(*parts, strict=True)))
 
@@ -258,11 +258,11 @@ class Exchanged:
     def sent_at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """What points (n, 3) within faces (n,) send on of what arrives there."""
         exchange, found, some = self.exchange, np.zeros(len(points)), np.flatnonzero(self.exchange.has[faces])
-        shifts, size = in_unit_square(len(some)), _AT_ONCE // _FROM_PIECE  # in blocks, which bounds the memory
+        shifted, size = shifts(len(some)), _AT_ONCE // _FROM_PIECE  # in blocks, which bounds the memory
         for at in range(0, len(some), size):
             here = some[at : at + size]
             normals = normals_at(exchange.solid, faces[here], points[here])
-            met = exchange.met(points[here], normals, _FROM_PIECE, shifts[at : at + size])
+            met = exchange.met(points[here], normals, _FROM_PIECE, shifted[at : at + size])
             found[here] = _white(self.scene, faces[here]) * self.gathered(met, len(here), _FROM_PIECE)
         return found
 
@@ -400,8 +400,8 @@ def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
     for many in dict.fromkeys(sheet.rays for sheet, *_ in bare):
         which = [k for k, (sheet, *_) in enumerate(bare) if sheet.rays == many]
         counts = [len(bare[k][1]) for k in which]
-        nodes, normals, shifts = (np.concatenate([bare[k][i] for k in which]) for i in (1, 2, 3))
-        met = exchange.met(nodes, normals, many, shifts)
+        nodes, normals, shifted = (np.concatenate([bare[k][i] for k in which]) for i in (1, 2, 3))
+        met = exchange.met(nodes, normals, many, shifted)
         for k, start, count in zip(which, np.cumsum(counts) - counts, counts, strict=True):
             part = slice(*np.searchsorted(met.starts, [start, start + count]))
             found[k] = Hits(*(each[part].copy() for each in met._replace(starts=met.starts - start)))
@@ -428,7 +428,7 @@ def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray
     nodes = onto(solid, face, nodes, min(within))
     rays = _FROM_SMALL if not facet and (frame.size < cell).any() else _FROM_NODE
     rays = _ROUGH_NODE if exchange.roughly else rays
-    shift = of_sequence(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
+    shift = shift_of(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
     sheet = Sheet(frame, u, v, NOTHING_MET, rays)
     return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shift, (len(nodes), 2))
 
@@ -438,7 +438,7 @@ def _nodes_beside(exchange: Exchange, annulus: Annulus) -> tuple[Sheet, np.ndarr
     face, rings = annulus.circle.face, annulus.rings
     nodes = onto(exchange.solid, face, annulus.nodes(), _WITHIN * annulus.width)
     sheet = Sheet(annulus, np.arange(annulus.count), rings, NOTHING_MET, _FROM_NODE)
-    return sheet, nodes, np.broadcast_to(exchange.solid.normals[face], nodes.shape), in_unit_square(len(nodes))
+    return sheet, nodes, np.broadcast_to(exchange.solid.normals[face], nodes.shape), shifts(len(nodes))
 
 
 @lru_cache(maxsize=8)
@@ -470,8 +470,8 @@ def once_reflected(
 
     Each sees others by other rays; facets ``own`` of the surface that the points lie on are none.
     """
-    bodies, shifts = scene.bodies, in_unit_square(len(points))
-    ways = ways_about(normals, (in_unit_square(_REFLECTED) + shifts[:, None]) % 1.0)
+    bodies = scene.bodies
+    ways = ways_about(normals, (in_unit_square(_REFLECTED) + shifts(len(points))[:, None]) % 1.0)
     starts = np.broadcast_to((points + _LIFT * bodies.extent * normals)[:, None], ways.shape)
     face, t = first_face(bodies, starts, ways, own)
     point, ray = np.nonzero(face >= 0)

@@ -13,6 +13,7 @@ import numpy as np
 from scenes import Solid
 
 _PLASTIC = 1.324717957244746  # x^3 = x + 1, whose powers fill a square evenly (Roberts 2018, "R2")
+_OTHER = 1.1673039782614187  # x^5 = x + 1, the same of four axes, whose powers no sum of the others' is (R4)
 _THINNED = 16  # so many even places stand for one where places are denser: as many times denser they are at most
 
 
@@ -56,12 +57,20 @@ class Places:
 
 def in_unit_square(count: int) -> np.ndarray:
     """So many points that fill the unit square evenly, (n, 2)."""
-    return of_sequence(np.arange(1, count + 1)[:, None])
+    return np.arange(1, count + 1)[:, None] / _PLASTIC ** np.arange(1, 3) % 1.0
 
 
-def of_sequence(number: int | np.ndarray) -> np.ndarray:
-    """Points of that sequence by their numbers, from 1, one more axis of 2."""
-    return number / _PLASTIC ** np.arange(1, 3) % 1.0
+def shifts(count: int) -> np.ndarray:
+    """So many shifts of the unit square, (n, 2), by which sets of its points are others wherever they are asked for."""
+    return shift_of(np.arange(1, count + 1)[:, None])
+
+
+def shift_of(number: int | np.ndarray) -> np.ndarray:
+    """Shifts by their numbers, from 1, one more axis of 2.
+
+    Of a sequence of its own: shifted by one of its own points, `in_unit_square` of n points is n - 1 of the same again.
+    """
+    return number / _OTHER ** np.arange(1, 3) % 1.0
 
 
 def ways_about(normals: np.ndarray, square: np.ndarray) -> np.ndarray:

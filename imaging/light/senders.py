@@ -10,7 +10,7 @@ import numpy as np
 
 from imaging.light.emitters import emitters, plain
 from imaging.light.exchange import Exchange, exchanged
-from imaging.light.places import in_unit_square
+from imaging.light.places import shifts
 from imaging.pictures import Pictures
 from scenes import Picture
 from scenes.lights import GLANCE
@@ -96,7 +96,7 @@ def _nearest(exchange: Exchange, points: np.ndarray, faces: np.ndarray) -> np.nd
     """How far the nearest of what points (n, 3) within faces (n,) see is, (n,); infinite where that is nothing."""
     found, some = np.full(len(points), np.inf), np.flatnonzero(exchange.has[faces])
     normals = exchange.solid.normals[faces[some]]
-    met = exchange.met(points[some], normals, _LOOKS, in_unit_square(len(some)))
+    met = exchange.met(points[some], normals, _LOOKS, shifts(len(some)))
     np.minimum.at(found, some[met.starts], np.linalg.norm(met.points - points[some[met.starts]], axis=1))
     return found
 
