@@ -172,7 +172,8 @@ class Exchange:
         point, ray = np.nonzero(self.has[face])  # nothing met, -1, is the last
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
-        return Hits(point, ray, places, face, self.tree.query(_placed(places, self.solid.normals[face], self.scale))[1])
+        coordinates = _placed(places, self.solid.normals[face], self.scale)
+        return Hits(point, ray, places, face, self.tree.query(coordinates, workers=-1)[1])
 
     def _met_or_floor(
         self, face: np.ndarray, t: np.ndarray, starts: np.ndarray, ways: np.ndarray
