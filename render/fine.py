@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from render.build import CUSTOM, MANY_WAYS, description, textured, view
 from render.even import Even, some_of
 from render.gathered import Gathering
 from render.large import Counts, Renders, fine_pixels, is_large, whole_pixels
+from render.modelled import Modelled
 from render.mosaic import Tiles
 from render.parts import Part
 from render.quality import Quality
@@ -178,7 +179,16 @@ class _Tracer:
     @property
     def is_large(self) -> bool:
         """Whether not all fine pixels are rendered: there are many, or each needs many rays."""
-        return self.random or is_large(self.crop, self.quality.supersample)
+        return self.random or self.modelled is not None or is_large(self.crop, self.quality.supersample)
+
+    @cached_property
+    def modelled(self) -> Modelled | None:
+        """What tells direct light where pictures are compared by what is measured in them; None where rays do."""
+        compared = self.scalar and self.quality.alike and not self.quality.everywhere
+        if not compared or self.part.silhouette or self.active - self.sharp - {"interreflection"}:
+            return None
+        start, width = self.start, self.crop[1].stop - self.crop[1].start
+        return Modelled.of(self.picture, self.quality.supersample, start, width)
 
     def rays(self, active: frozenset[str]) -> Rays:
         """Of a compiled variant, with some effects."""
@@ -273,13 +283,10 @@ class _Tracer:
         picture, k = self.picture, self.quality.supersample
         between = self.active - self.sharp == {"interreflection"}
         apart, plane = self.scalar and self.quality.alike, not (picture.scene.solid.curved or self.part.silhouette)
-        loaded = {
-            False: (self.load(self.sharp, self.ordinary, self.textures), self.sharp),
-            True: (self.load(self.active, self.few), self.active),
-        }
+        again = {random: self._again(random) for random in {False, self.random}}
         renders = Renders(
             self.whole,
-            lambda random, *what: self.again_alone(*loaded[random], *what),
+            lambda random, *what: again[random](*what),
             k,
             self.random,
             self.quality.everywhere,
@@ -289,6 +296,14 @@ class _Tracer:
         )
         counts = Counts(self.ordinary, self.few, self.near, self.many)
         return fine_pixels(picture, self.crop, renders, math.ceil(k * defocus(picture)), counts)
+
+    def _again(self, random: bool) -> Callable[[np.ndarray, np.ndarray, int], np.ndarray]:
+        """What renders marked fine pixels again, with or without the effects of random rays."""
+        if random:
+            return partial(self.again_alone, self.load(self.active, self.few), self.active)
+        if self.modelled is not None:
+            return self.modelled.rendered
+        return partial(self.again_alone, self.load(self.sharp, self.ordinary, self.textures), self.sharp)
 
     def _even(self) -> Even:
         """Where light that plane faces send to each other may be seen, in whole pixels, and where it is even."""

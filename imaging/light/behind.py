@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from imaging.light.appearance import analyser_axis, face_signal, signal, unit
 from imaging.light.backlight import backlights, backlit
 from imaging.light.between import light_between
 from imaging.pictures import Pictures
-from scenes import Floor, Material, Solid
+from scenes import Camera, Floor, Material, Solid
 from scenes.materials.vectors import chosen
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -85,6 +86,47 @@ def seen_by_rays(pictures: Pictures, origins: np.ndarray, vectors: np.ndarray) -
     """The same along lines of sight from places (n, 3) on."""
     start = origins + _NEAR * pictures.scene.solid.extent * unit(vectors)
     return behind(pictures, start, np.ones(len(vectors), bool), ())
+
+
+class Met(NamedTuple):
+    """What lines of sight meet, whatever the lights.
+
+    Attributes
+    ----------
+    faces : ndarray of int, shape (n,)
+        The number of a face of the bodies, that after the last for the floor, -1 for nothing.
+    points : ndarray, shape (n, 3)
+        Where, scene units.
+    """
+
+    faces: np.ndarray
+    points: np.ndarray
+
+
+def met_at(bodies: Solid, floor: Floor | None, camera: Camera, sensor: np.ndarray, image: np.ndarray) -> Met:
+    """What a sensor of one pose (2,) sees at image points (n, 2) from the middle, ideal px."""
+    starts, vectors = (make(image, sensor, camera) for make in (ray_origins, rays))
+    starts = starts + _NEAR * bodies.extent * unit(vectors)
+    faces, t = first_face(bodies, starts, vectors, ())
+    points = starts + np.where(faces >= 0, t, 0.0)[:, None] * vectors
+    if floor is not None:
+        places, ahead = _on_floor(floor, starts, vectors, t)
+        faces, points = np.where(ahead, len(bodies.faces), faces), np.where(ahead[:, None], places, points)
+    return Met(faces, points)
+
+
+def direct_light(pictures: Pictures, met: Met) -> np.ndarray:
+    """Signal (n,) that what is met has of one picture's lights alone, darkness in shadows."""
+    bodies, found = pictures.scene.bodies, np.zeros(len(met.faces))
+    here = np.flatnonzero((met.faces >= 0) & (met.faces < len(bodies.faces)))
+    there = np.flatnonzero(met.faces == len(bodies.faces))
+    if here.size:
+        points, faces = met.points.take(here, 0), met.faces[here]
+        lit = tuple(reaches(bodies, points, faces, each.at) for each in pictures.emitters)
+        found[here] = face_signal(pictures, points, faces, 1, lit)
+    if there.size:
+        found[there] = floor_signal(pictures, met.points.take(there, 0), np.ones(len(there), bool))
+    return found
 
 
 def shadow_steps(pictures: Pictures, image: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from imaging.blurred.whole import image as drawn
 from imaging.blurred.whole import is_drawable
 from imaging.colour import seen
 from measure import Images
+from render import modelled
 from render.build import MANY_WAYS
 from render.large import LARGE
 from render.surroundings import near_required
@@ -77,6 +78,7 @@ def completed(
         rendered = whole if is_below(picture, LARGE) else direct
         made = drawing if _is_drawn(picture, first, drawing) else rendered
         changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
+    modelled.forget()
     changed = {name: some for name, some in changed.items() if some}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
 

@@ -1,0 +1,151 @@
+"""Direct light in fine pixels as the image model has it, where pictures from one place are compared.
+
+What lines of sight meet is the same whatever the light, and is looked for once: under another light only shadows are.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+
+from imaging.geometry.lens import image_centre
+from imaging.light.behind import Met, direct_light, met_at
+from imaging.light.emitters import is_point
+from imaging.pictures import Pictures
+from scenes import Camera, Floor, Picture, Pose, Solid
+
+_AT_ONCE = 1 << 14  # rays whose temporary arrays stay near to the processor
+_WORKERS = min(os.cpu_count() or 1, 4)  # threads, of NumPy and Embree alone: the renderer has its own
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class View:
+    """What is seen in fine pixels.
+
+    Attributes
+    ----------
+    bodies : Solid
+    floor : Floor or None
+    camera : Camera
+    sensor : Pose
+    supersample : int
+        Fine pixels that divide a pixel, each way.
+    start : tuple of int
+        Row and column in the whole frame of an image's first fine pixel.
+    width : int
+        Fine pixels of a row of the image.
+    """
+
+    bodies: Solid
+    floor: Floor | None
+    camera: Camera
+    sensor: Pose
+    supersample: int
+    start: tuple[int, int]
+    width: int
+
+    def met(self, pixels: np.ndarray, samples: int) -> Met:
+        """By rays of fine pixels (n,), numbered row by row: a square number of each, in a grid; (n samples)."""
+        parts = _each(lambda part: self._met(pixels[part], math.isqrt(samples)), len(pixels), _AT_ONCE // samples)
+        return Met(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def _met(self, pixels: np.ndarray, side: int) -> Met:
+        within = (np.arange(side) + 0.5) / side
+        y, x = (
+            at[:, None] + first + within for at, first in zip(np.divmod(pixels, self.width), self.start, strict=True)
+        )
+        seen = np.stack(np.broadcast_arrays(x[:, None], y[:, :, None]), -1).reshape(-1, 2) / self.supersample - 0.5
+        image = seen - image_centre(self.camera)
+        return met_at(self.bodies, self.floor, self.camera, np.array(list(self.sensor)), image)
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """What rays of a view have met so far: by how many a pixel has, numbers of pixels in order and what theirs met."""
+
+    view: View
+    _known: dict[int, tuple[np.ndarray, Met]] = field(default_factory=dict)
+
+    def met(self, pixels: np.ndarray, samples: int) -> Met:
+        """As `View.met`, of numbers in order."""
+        known = self._known.get(samples)
+        if known is None:
+            known = pixels, self.view.met(pixels, samples)
+        new = np.setdiff1d(pixels, known[0], assume_unique=True)
+        if new.size:
+            met = zip(known[1], self.view.met(new, samples), strict=True)
+            known = _sorted(np.append(known[0], new), Met(*map(np.concatenate, met)), samples)
+        self._known[samples] = known
+        if len(known[0]) == len(pixels):
+            return known[1]
+        return _some(known[1], np.searchsorted(known[0], pixels), samples)
+
+
+def _sorted(pixels: np.ndarray, met: Met, samples: int) -> tuple[np.ndarray, Met]:
+    """Fine pixels by their numbers, and what rays of each meet."""
+    order = np.argsort(pixels)
+    return pixels[order], _some(met, order, samples)
+
+
+def _some(met: Met, which: np.ndarray, samples: int) -> Met:
+    """What the rays of some fine pixels meet."""
+    faces, points = met.faces.reshape(-1, samples), met.points.reshape(-1, samples, 3)
+    return Met(faces.take(which, 0).ravel(), points.take(which, 0).reshape(-1, 3))
+
+
+def _each(made: Callable[[slice], T], count: int, size: int) -> list[T]:
+    """What is made of some of so many at a time, on all processor cores."""
+    size = max(size, 1)
+    parts = [slice(at, at + size) for at in range(0, count, size)]
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        return list(pool.map(made, parts))
+
+
+_looked = lru_cache(maxsize=1)(Looked)  # pictures that are compared follow each other
+
+
+def forget() -> None:
+    """Give back what rays have met: in the midst of large images it keeps memory from being used again, 0.4 GiB."""
+    _looked.cache_clear()
+
+
+@dataclass(frozen=True, eq=False)
+class Modelled:
+    """Direct light of one picture.
+
+    Attributes
+    ----------
+    pictures : Pictures
+        Of one, whose light is a point.
+    view : View
+    """
+
+    pictures: Pictures
+    view: View
+
+    @classmethod
+    def of(cls, picture: Picture, supersample: int, start: tuple[int, int], width: int) -> Modelled | None:
+        """None where surfaces or a light of the model are not as a render has them, point by point."""
+        scene = picture.scene
+        if scene.solid.curved or scene.textures or scene.placement.board is not None or not is_point(scene.lights):
+            return None
+        view = View(scene.bodies, scene.bright_floor, scene.camera, picture.sensor, supersample, start, width)
+        return cls(Pictures.of(picture), view)
+
+    def rendered(self, fine: np.ndarray, marked: np.ndarray, samples: int) -> np.ndarray:
+        """The image itself, its marked fine pixels anew, each the mean of so many rays, a square number."""
+        where = np.flatnonzero(marked)
+        if not where.size:
+            return fine
+        faces, points = _looked(self.view).met(where, samples)
+        light = _each(lambda part: direct_light(self.pictures, Met(faces[part], points[part])), len(faces), _AT_ONCE)
+        fine.flat[where] = np.concatenate(light).reshape(-1, samples).mean(1)
+        return fine

@@ -1,0 +1,89 @@
+"""Direct light of pictures that are compared, by the image model instead of the renderer's rays: `render.modelled`."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import render
+import scenes
+from imaging.light.behind import Met
+from render import modelled
+from render.surroundings import near_required
+from scenes import Picture, Pose
+
+FEW = render.Quality(supersample=2, samples=1, edge_samples=16, everywhere=False, alike=True)
+DIRECT = ("attached_shadow", "cast_shadow", "fall_off")
+
+
+def picture(name, setting):
+    scene = scenes.load(name)
+    each = scene.settings[setting]
+    return Picture.of(scene, each.sensor, each.light)
+
+
+def direct(shown):
+    return render.image(shown, quality=FEW, variant="scalar_rgb", effects=DIRECT)
+
+
+def by_rays(shown, monkeypatch):
+    """The same by the renderer's rays."""
+    with monkeypatch.context() as changed:
+        changed.setattr(modelled.Modelled, "of", lambda *_: None)
+        return direct(shown)
+
+
+@pytest.mark.parametrize(("name", "setting"), [("bracket", 0), ("grey_floor", 0), ("plate", 0), ("two_lights", 0)])
+def test_the_image_model_draws_direct_light_as_rays_do(name, setting, monkeypatch):
+    """Where something is measured: hidden edges, cast shadows, a floor, round walls, two lights."""
+    here = picture(name, setting)
+    camera = here.scene.camera
+    near = near_required(here, (slice(0, camera.height), slice(0, camera.width)), 1, 0.0)
+    rendered, told = by_rays(here, monkeypatch)[near], direct(here)[near]
+    assert np.ptp(rendered) > 20  # margin: seen and lit, and beside an edge: levels
+    assert np.sqrt(np.square(told - rendered).mean()) < 0.13  # measured: 0.062 on `bracket`, 0.008 elsewhere
+    assert told == pytest.approx(rendered, abs=2.0)  # measured: 0.96 on `bracket`, 0.13 elsewhere
+    assert abs(np.median(told - rendered)) < 1e-5  # single precision: 6e-7
+
+
+def test_rays_that_pictures_share_are_traced_once(monkeypatch):
+    """A light elsewhere has other shadows: of its rays only those of fine pixels that were not looked at before."""
+    here, asked = picture("grey_floor", 0), []
+    traced = modelled.View.met
+
+    def met(view, pixels, samples):
+        asked.append((samples, set(pixels.tolist())))
+        return traced(view, pixels, samples)
+
+    monkeypatch.setattr(modelled.View, "met", met)
+    modelled.forget()
+    first = direct(here)
+    count = len(asked)
+    polar, azimuth = here.lights[0]
+    other = direct(replace(here, lights=(Pose(polar + 1.0, azimuth),)))
+    assert np.abs(other - first).max() > 1.0
+    for k, (samples, pixels) in enumerate(asked):
+        assert not any(pixels & before for many, before in asked[:k] if many == samples)
+    assert sum(len(pixels) for _, pixels in asked[count:]) < 0.2 * sum(len(pixels) for _, pixels in asked[:count])
+    modelled.forget()
+    assert np.array_equal(direct(replace(here, lights=(Pose(polar + 1.0, azimuth),))), other)
+
+
+def test_what_rays_met_is_found_again_by_the_numbers_of_pixels():
+    class Numbers:
+        def met(self, pixels, samples):
+            faces = (10 * pixels[:, None] + np.arange(samples)).ravel()
+            return Met(faces, np.repeat(faces[:, None], 3, 1))
+
+    looked = modelled.Looked(Numbers())
+    for pixels in ([2, 5, 9], [2, 5, 9], [1, 5, 7, 12], [9], [1, 2, 5, 7, 9, 12]):
+        faces, points = looked.met(np.array(pixels), 4)
+        assert faces.tolist() == [10 * pixel + k for pixel in pixels for k in range(4)]
+        assert (points == faces[:, None]).all()
+
+
+@pytest.mark.parametrize("name", ["shaft", "printed_label", "board_block", "ring_light"])
+def test_what_the_image_model_does_not_tell_point_by_point_is_rendered(name):
+    """Round walls, print, a board, a light of some size."""
+    here = picture(name, 0)
+    assert modelled.Modelled.of(here, 2, (0, 0), 2 * here.scene.camera.width) is None
