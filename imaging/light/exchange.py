@@ -173,7 +173,7 @@ class Exchange:
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
         coordinates = _placed(places, self.solid.normals[face], self.scale)
-        return Hits(point, ray, places, face, self.tree.query(coordinates, workers=-1)[1])
+        return Hits(point, ray, places, face, self.tree.query(coordinates)[1])
 
     def _met_or_floor(
         self, face: np.ndarray, t: np.ndarray, starts: np.ndarray, ways: np.ndarray
