@@ -105,8 +105,7 @@ class Met(NamedTuple):
 
 def met_at(bodies: Solid, floor: Floor | None, camera: Camera, sensor: np.ndarray, image: np.ndarray) -> Met:
     """What a sensor of one pose (2,) sees at image points (n, 2) from the middle, ideal px."""
-    starts, vectors = (make(image, sensor, camera) for make in (ray_origins, rays))
-    starts = starts + _NEAR * bodies.extent * unit(vectors)
+    starts, vectors = _lines_of_sight(image, sensor, camera, bodies.extent)
     faces, t = first_face(bodies, starts, vectors, ())
     points = starts + np.where(faces >= 0, t, 0.0)[:, None] * vectors
     if floor is not None:
@@ -134,8 +133,7 @@ def shadow_steps(pictures: Pictures, image: np.ndarray) -> np.ndarray:
     the middle, of one picture: signal of the next less that of this one, shape (n, k - 1); 0 between other surfaces.
     """
     scene, bodies, pictures = pictures.scene, pictures.scene.bodies, pictures.glanced
-    start, vectors = (make(image, pictures.sensors, scene.camera) for make in (ray_origins, rays))
-    start = start + _NEAR * scene.solid.extent * unit(vectors)
+    start, vectors = _lines_of_sight(image, pictures.sensors, scene.camera, scene.solid.extent)
     face, t = first_face(bodies, start, vectors, ())
     hit, met = start + np.where(face >= 0, t, 0.0)[..., None] * vectors, face >= 0
     lit = np.array([_where(met, hit, face, each.at, partial(reaches, bodies)) for each in pictures.emitters])
@@ -148,6 +146,12 @@ def shadow_steps(pictures: Pictures, image: np.ndarray) -> np.ndarray:
         return np.zeros(ends.shape)
     signal = behind(pictures, start, np.ones(face.shape, bool), ())
     return np.where(ends, np.diff(signal, axis=-1), 0.0)
+
+
+def _lines_of_sight(image, sensor, camera, extent) -> tuple[np.ndarray, np.ndarray]:
+    """Where lines of sight through image points begin, in front of the sensor, and which way they go."""
+    starts, vectors = (make(image, sensor, camera) for make in (ray_origins, rays))
+    return starts + _NEAR * extent * unit(vectors), vectors
 
 
 def floor_signal(pictures: Pictures, places: np.ndarray, wanted: np.ndarray, *, fall_off: bool = True) -> np.ndarray:
