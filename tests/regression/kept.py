@@ -14,6 +14,7 @@ from tests.regression.returns import CALLS, Call
 from tests.regression.stored import CLOSED, RENDERED, SEARCHED
 
 STORED = Path(__file__).with_name("returns.json")
+APART = Path(__file__).with_name("apart.json")  # what processors give otherwise, which is not stored
 _TOLERANCES = CLOSED, SEARCHED, RENDERED  # of the number of a digest, about a relative change; the rest is not compared
 _PART = 0.2  # of a tolerance that runs may differ by which were made to store: others differ more
 _NO = "-"
@@ -24,6 +25,7 @@ _STEP = 0.03  # seconds of a test beside its case
 _WAYS = "what it was given or gave", "what it held on the way"
 
 Kept = dict[str, dict[str, list[str]]]  # by function and case: a line for each of `_WAYS`
+Entry = tuple[str, str, str]  # function, case, one of `_WAYS`
 
 
 @functools.cache
@@ -84,17 +86,32 @@ def _alike(said: str, told: str, tolerance: str) -> bool:
     return abs(float(one[1]) - float(other[1])) <= float(tolerance)
 
 
-def loosened(stored: Kept, runs: dict[str, dict[str, list[Call]]]) -> Kept:
-    """The same without what runs by case and function on one more processor do not give."""
+def entries(stored: Path) -> set[Entry]:
+    """What is told apart in a file of ``APART``'s kind."""
+    return {(f, case, way) for f, case, way in json.loads(stored.read_text(encoding="utf-8"))}
+
+
+def otherwise(stored: Kept, runs: dict[str, dict[str, list[Call]]]) -> set[Entry]:
+    """What runs by case and function on one more processor give otherwise than is stored."""
+    return {
+        (function, case, way)
+        for function, cases in stored.items()
+        for case, lines in cases.items()
+        for k, way in enumerate(_WAYS)
+        if list(_of_function(function, _alone(lines, k), runs[case].get(function)))
+    }
+
+
+def _alone(lines: list[str], k: int) -> list[str]:
+    return [each if i == k else _NO for i, each in enumerate(lines)]
+
+
+def loosened(stored: Kept, apart: set[Entry]) -> Kept:
+    """The same without the entries that are told apart."""
     found: Kept = {}
     for function, cases in stored.items():
         for case, lines in cases.items():
-            calls = runs[case].get(function)
-            one_by_one = [[each if way == k else _NO for k, each in enumerate(lines)] for way in range(len(lines))]
-            left = [
-                each if not list(_of_function(function, alone, calls)) else _NO
-                for each, alone in zip(lines, one_by_one, strict=True)
-            ]
+            left = [_NO if (function, case, way) in apart else each for each, way in zip(lines, _WAYS, strict=True)]
             if left != [_NO] * len(left):
                 found.setdefault(function, {})[case] = left
     return found

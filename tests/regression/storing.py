@@ -22,7 +22,7 @@ from typing import Any
 
 from tests.machines import HASWELL, KERNELS, OLD, SANDY, Machine, libraries
 from tests.regression.digest import Digest
-from tests.regression.kept import STORED, Kept, by_case, chosen, kept, loosened, read
+from tests.regression.kept import APART, STORED, Entry, Kept, by_case, chosen, entries, kept, loosened, otherwise, read
 from tests.regression.returns import PACKAGES, ROOT, recorded
 
 _CLOCKS = "time", "perf_counter", "process_time", "monotonic"
@@ -58,13 +58,20 @@ def store(choose: bool) -> None:
         cases = sorted(_choice(folder) if choose or not STORED.exists() else by_case(STORED))
         folders = [folder / str(number) for number in range(len(WAYS))]
         found = kept(list(executor.map(_run, WAYS, [cases] * len(WAYS), folders)))
-    _write(found)
+    _write(loosened(found, entries(APART)))
 
 
 def loosen() -> None:
-    """Leave out of what is stored what this processor does not give: to be run where no function has changed."""
+    """Leave out, now and whenever is stored, what this processor gives otherwise: where no function has changed."""
     with tempfile.TemporaryDirectory() as name:
-        _write(loosened(read(STORED), _run(Way(), sorted(by_case(STORED)), Path(name) / "0")))
+        found = otherwise(read(STORED), _run(Way(), sorted(by_case(STORED)), Path(name) / "0"))
+    _write_apart(entries(APART) | found)
+    _write(loosened(read(STORED), found))
+
+
+def _write_apart(found: set[Entry]) -> None:
+    APART.write_text("[\n" + ",\n".join(map(json.dumps, sorted(found))) + "\n]\n", encoding="utf-8")
+    print(f"{len(found)} entries that processors give otherwise: {APART}")
 
 
 def _write(found: Kept) -> None:

@@ -153,17 +153,27 @@ def test_functions_that_are_gone_and_new_ones_and_numbers_of_calls():
     assert kept.different(twice, now)[0].endswith("got no call")
 
 
-def test_what_one_more_processor_does_not_give_is_left_out():
+def test_what_one_more_processor_gives_otherwise_is_left_out():
     """Of the function that differs what differs, the rest stays; nothing where all is given."""
     before, now = {f: {"case": lines} for f, lines in stored(interval).items()}, {"case": calls_of(interval)}
-    assert kept.loosened(before, now) == before
+    assert kept.otherwise(before, now) == set()
     first, way = before[RATIO]["case"]
     digits = first.split()
     other = " ".join([*digits[:2], "00000000" + digits[2][8:]])
     assert other != first
-    told = kept.loosened(before | {RATIO: {"case": [other, way]}}, now)
+    changed = before | {RATIO: {"case": [other, way]}}
+    apart = kept.otherwise(changed, now)
+    assert apart == {(RATIO, "case", kept._WAYS[0])}
+    told = kept.loosened(changed, apart)
     assert told[QUANTILES] == before[QUANTILES]
     assert told.get(RATIO, {"case": ["-", "-"]}) == {"case": ["-", way]}
+
+
+def test_what_processors_give_otherwise_is_not_stored():
+    """What was told apart once stays out when returns are stored anew on one processor."""
+    apart = kept.entries(kept.APART)
+    assert apart
+    assert kept.loosened(kept.read(kept.STORED), apart) == kept.read(kept.STORED)
 
 
 def test_cases_render_uncompiled_whatever_is_there(monkeypatch):
