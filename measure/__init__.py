@@ -6,7 +6,7 @@ ice_vision.check(__file__, "scenes", "imaging")
 
 from typing import TYPE_CHECKING
 
-from measure.best import best_estimator
+from measure.best import best_estimator, other_estimators
 from measure.boards.charuco import charuco
 from measure.boards.chessboard import Board, chessboard
 from measure.boards.dots import dot_grid
@@ -109,6 +109,7 @@ __all__ = [
     "mtf",
     "next_board",
     "noise_curve",
+    "other_estimators",
     "photograph",
     "photon_transfer",
     "projection_difference",

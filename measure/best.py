@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from imaging.models.arranged import is_arranged
 from measure.estimators.arrangement import ArrangementEstimator
+from measure.estimators.registry import is_for
 from measure.features.arranged import is_told
 from measure.features.layout import layout_of
 from measure.features.shape import prepared
 from scenes import Picture, Scene
+
+_OTHERWISE = ("isophote", "strip")
 
 
 def best_estimator(scene: Scene | Picture) -> str:
@@ -22,6 +25,16 @@ def best_estimator(scene: Scene | Picture) -> str:
     if not is_arranged(scene):
         return "gradient"
     return "arrangement" if picture is None or not picture.lights or _tells(picture) else "gradient"
+
+
+def other_estimators(scene: Scene) -> tuple[str, ...]:
+    """What may know more of some values where the best one does not know enough, the quickest first.
+
+    ``isophote`` reads less far beside an edge, and ``strip`` finds levels where ``gradient`` finds slopes: what a shadow
+    or a bright face nearby does to the one, and how much of it follows a reflectance that is not known, is not what it
+    does to the other.
+    """
+    return tuple(name for name in _OTHERWISE if is_for(name, scene.noise))
 
 
 def _tells(picture: Picture) -> bool:

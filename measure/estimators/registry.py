@@ -6,7 +6,7 @@ from measure.estimators import arrangement, canny, gradient, isophote, strip
 from measure.estimators.estimate import Estimator
 from measure.estimators.kinds import ESTIMATORS
 from measure.features.layout import Layout
-from scenes import InvalidInput
+from scenes import InvalidInput, Noise
 
 _ALIKE = ("strip", "arrangement")  # those that take pixels for independent and equally noisy
 SYNONYMS = {"polygon": "arrangement"}  # a polygon alone is the simplest arrangement
@@ -24,6 +24,11 @@ def known_name(name: str) -> str:
     if name not in ESTIMATORS:
         raise InvalidInput(f"estimator must be one of {', '.join(ESTIMATORS)}, got {name!r}")
     return name
+
+
+def is_for(name: str, noise: Noise) -> bool:
+    """Whether an estimator takes pixels for what they are under a sensor's noise."""
+    return name not in _ALIKE or (noise.colour is None and not noise.is_shared)
 
 
 def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
@@ -46,7 +51,7 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
     if not threshold > 0:
         raise InvalidInput(f"threshold must be greater than 0, got {threshold!r}")
     sensor = layout.optics.sensor
-    if name in _ALIKE and (sensor.colour is not None or sensor.is_shared):
+    if not is_for(name, sensor):
         others = ", ".join(each for each in ESTIMATORS if each not in _ALIKE)
         why = "colour, whose pixels are not alike" if sensor.colour else "row_sigma or column_sigma, which pixels share"
         raise InvalidInput(f"estimator must be one of {others} with noise.{why}, got {name!r}")

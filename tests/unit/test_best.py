@@ -51,29 +51,55 @@ def test_where_an_arrangement_is_ill_conditioned_the_default_measures():
 
 
 @pytest.mark.parametrize(
-    ("by_default", "by_isophotes", "taken"),
+    ("states", "taken", "asked"),
     [
-        (OK, OK, "gradient"),
-        (CLUTTER, OK, "gradient"),  # not asked: what is not known of a bias is another thing
-        (ILL_CONDITIONED, OK, "isophote"),
-        (ILL_CONDITIONED, CLUTTER, "gradient"),
+        ((OK, OK, OK), "gradient", 1),
+        ((ILL_CONDITIONED, OK, OK), "isophote", 2),
+        ((ILL_CONDITIONED, CLUTTER, CLUTTER), "gradient", 2),  # not all of it: noise decides, which takes long to tell
+        ((CLUTTER, OK, OK), "isophote", 2),
+        ((CLUTTER, CLUTTER, OK), "strip", 3),
+        ((CLUTTER, ILL_CONDITIONED, OK), "strip", 3),
+        ((CLUTTER, CLUTTER, CLUTTER), "gradient", 3),
     ],
 )
-def test_isophotes_measure_where_they_alone_tell_which_edge_it_is(by_default, by_isophotes, taken):
-    """Of the simulated picture; corrections of states that are made up."""
-    asked = []
+def test_another_estimator_measures_where_it_alone_tells_the_value(states, taken, asked):
+    """Of the simulated picture; corrections of states that are made up, by gradient, isophotes, strips."""
+    picture = Picture.of(scenes.load("grey_floor"), (30, 15), (15, 315))
+    seen, made = made_up(dict(zip(("gradient", "isophote", "strip"), states, strict=True)))
+    assert simulation.best(picture, made).estimator == taken
+    assert seen == ["gradient", "isophote", "strip"][:asked]
+
+
+def test_images_above_a_megapixel_are_simulated_once_where_a_bias_is_not_known():
+    """But where noise decides which edge it is, twice."""
+    picture = Picture.of(scenes.load("bracket_mm"), (30, 40), (35, 67))
+    for state, asked in ((CLUTTER, ["gradient"]), (ILL_CONDITIONED, ["gradient", "isophote"])):
+        seen, made = made_up({"gradient": state, "isophote": OK, "strip": OK})
+        simulation.best(picture, made)
+        assert seen == asked
+
+
+def test_what_pixels_of_a_sensor_are_not_is_not_asked_of_them():
+    """Strips take pixels for equal, or for independent."""
+    scene = scenes.load("grey_floor")
+    assert measure.other_estimators(scene) == ("isophote", "strip")
+    for noise in ({"row_sigma": 0.5}, {"colour": {"pattern": "RGGB"}}):
+        assert measure.other_estimators(scene.with_(noise=noise)) == ("isophote",)
+
+
+def made_up(states):
+    """Names of estimators that were asked, and what makes corrections of states by estimator."""
+    seen = []
 
     def made(picture, method):
-        asked.append(method.locator)
-        state = by_default if method.locator == "gradient" else by_isophotes
-        bias, one = np.full(1, np.nan if state == ILL_CONDITIONED else 0.0), np.ones((1, 1))
-        doubt = {"reflectance": np.full(1, 9.0 if state == CLUTTER else 0.1)}
-        quantities = picture.scene.quantities
-        return measure.Correction(quantities, method.locator, None, bias, bias, doubt, doubt, one, one, (state,))
+        seen.append(method.locator)
+        state, count = states[method.locator], len(picture.scene.quantities)
+        bias, square = np.full(count, np.nan if state == ILL_CONDITIONED else 0.0), np.eye(count)
+        doubt = {"reflectance": np.full(count, 9.0 if state == CLUTTER else 0.1)}
+        given = picture.scene.quantities, method.locator, None, bias, bias, doubt, doubt, square, square
+        return measure.Correction(*given, (state,) * count)
 
-    picture = Picture.of(scenes.load("grey_floor"), (30, 15), (15, 315))
-    assert simulation.best(picture, made).estimator == taken
-    assert asked == ["gradient"] + ["isophote"] * (by_default == ILL_CONDITIONED)
+    return seen, made
 
 
 @pytest.mark.render

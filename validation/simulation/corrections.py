@@ -31,7 +31,6 @@ from validation.simulation.images import completed, of_all, rebased, settled
 
 _PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
 _ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
-_OTHERWISE = "isophote"  # where the default estimator does not tell which of two edges it is on
 _NOISY = 8  # pictures in which a texture is looked for
 _QUIET, _OF_TOLERANCE = 0.1, 0.01  # parts of sigma, and of the tolerance, that the renderer's noise stays below
 
@@ -57,16 +56,26 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
 
 
 def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simulated) -> Correction:
-    """The correction of a picture by its default estimator; by isophotes where these tell values that it does not.
+    """The correction of a picture by its default estimator; by another one that tells more of its values.
 
     Where two edges run together noise may decide which of them an edge point is on by one rule, and not by another:
-    that a simulated picture tells, without an image. What ``made`` makes is a correction by one method.
+    that a simulated picture tells, without an image. And a bias that is not known well enough for one may be for
+    another, which is less precise (`measure.other_estimators`): in images up to a megapixel, where that takes less
+    time than looking for what else would tell of it. What ``made`` makes is a correction by one method.
     """
     found = made(picture, Method(measure.best_estimator(picture)))
-    if ILL_CONDITIONED not in found.simulated:
-        return found
-    other = made(picture, Method(_OTHERWISE))
-    return other if _trusted(other) > _trusted(found) else found
+    for name in measure.other_estimators(picture.scene):
+        if not _may_be_told(picture, found, measure.ESTIMATORS[name].local):
+            break
+        other = made(picture, Method(name))
+        found = other if _trusted(other) > _trusted(found) else found
+    return found
+
+
+def _may_be_told(picture: Picture, found: Correction, local: bool) -> bool:
+    """Whether another estimator may tell more: one that looks where nothing is measured, too, takes long."""
+    unknown = CLUTTER in found.status and is_below(picture, LARGE)
+    return unknown or (local and ILL_CONDITIONED in found.simulated)
 
 
 def _trusted(found: Correction) -> int:
