@@ -45,10 +45,9 @@ class Annulus:
     @classmethod
     def beside(cls, solid: Solid, circle: Circle, cell: float) -> Annulus:
         """As wide and as dense as a rim needs on a face that is told in cells of some side."""
-        length = circle.turn * circle.radius
-        count = max(_AROUND * circle.turn / (2 * np.pi), _DENSEST * length / cell)
         outwards = 1 if circle.hole == solid.edge(circle.edges[0]).convex else -1
-        return cls(circle, min(_WIDE * circle.radius, cell), max(4, int(np.ceil(count))), outwards)
+        count = nodes_around(circle.turn, circle.radius, cell)
+        return cls(circle, min(_WIDE * circle.radius, cell), count, outwards)
 
     @property
     def closed(self) -> bool:
@@ -93,6 +92,11 @@ class Annulus:
     def _away(self, points: np.ndarray) -> np.ndarray:
         """Distance of points (n, 3) from the rim, positive on the face."""
         return self.outwards * (length(points - self.circle.centre) - self.circle.radius)
+
+
+def nodes_around(turn: float, radius: float, cell: float) -> int:
+    """How many tell what is so round, of some turn in rad, where light is told in cells of some side."""
+    return max(4, int(np.ceil(max(_AROUND * turn / (2 * np.pi), _DENSEST * turn * radius / cell))))
 
 
 def measured_rims(scene: Scene) -> tuple[Circle, ...]:

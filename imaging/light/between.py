@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from imaging.light.bore import Bore, bores, light_in_bore, place_in
+from imaging.light.bore import Bore, alone, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters, plain
 from imaging.light.exchange import Exchanged, exchanged, once_reflected
 from imaging.light.illumination import dimming_of_one
 from imaging.light.irradiance import beam
 from imaging.pictures import Pictures
-from scenes import Scene
+from scenes import Scene, Solid
 from scenes.lights import GLANCE
 
 if TYPE_CHECKING:
@@ -34,12 +34,14 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     shining = tuple(plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
     shape = np.broadcast_shapes(np.shape(faces), points.shape[:-1])
     points, faces = np.broadcast_to(points, (*shape, 3)), np.broadcast_to(faces, shape)
-    lent = _of_faces(scene, shining, pictures.roughly)
-    found = np.zeros(shape) if lent is None else lent.at(points, faces)
+    lent, found = _of_faces(scene, shining, pictures.roughly), np.zeros(shape)
     for bore in bores(scene.solid):
         inside = np.isin(faces, bore.faces)
         if inside.any():
             found[inside] = _of_wall(scene, shining, bore, pictures.roughly).ev(*place_in(bore, points[inside]))
+    others = ~np.isin(faces, _walls(scene.solid))
+    if lent is not None and others.any():
+        found[others] = lent.at(points[others], faces[others])
     analysed = scene.camera.analyser_deg is not None
     white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
     found = scene.camera.exposure * white[scene.surfaces.kinds[faces]] * np.where(asked, found, 0.0)
@@ -75,10 +77,15 @@ def is_exchanged(scene: Scene) -> bool:
     return not scene.bodies.is_convex or scene.bright_floor is not None
 
 
-def _of_faces(scene: Scene, shining: tuple[Emitter, ...], roughly: bool = False) -> Exchanged | None:
-    """Light between plane faces."""
-    walls = tuple(sorted({face for bore in bores(scene.solid) for face in bore.faces}))
-    return exchanged(scene, shining, walls, roughly)
+def _of_faces(scene: Scene, shining: tuple[Emitter, ...], roughly: bool) -> Exchanged | None:
+    """Light between all faces but walls of bores that see themselves alone."""
+    return exchanged(scene, shining, roughly, alone(scene.bodies, scene.solid, scene.bright_floor))
+
+
+@lru_cache(maxsize=4)
+def _walls(solid: Solid) -> np.ndarray:
+    """Facets of all bores, (n,)."""
+    return np.array(sorted({face for bore in bores(solid) for face in bore.faces}), int)
 
 
 @lru_cache(maxsize=64)

@@ -17,8 +17,8 @@ from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
 from imaging.light.exchange import Exchange, Exchanged, Hits
 from imaging.light.irradiance import beam
-from imaging.light.places import shifts
-from scenes import Circle, Scene, Solid
+from imaging.light.places import in_unit_square, shifts, ways_about
+from scenes import Circle, Floor, Scene, Solid
 
 if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _AROUND, _DEEP = 48, 24  # patches
 _FINE = 5  # places in a patch, around, over which a form factor is averaged
 _FROM_WALL, _ROUGHLY = 256, 32  # rays; where the light is told roughly
+_LOOKS = 8  # rays from each patch that look for anything but the wall
 _NODES = 13  # depths at which the light is told
 _ALIKE = 1e-3  # of the radius: by how much the two rims of one wall may differ
 _SLANTED = 0.02  # sine of the angle between a facet of a wall and the axis
@@ -81,6 +82,20 @@ def _bore(solid: Solid, rim: Circle, other: Circle, length: float) -> Bore:
     middles = solid.vertices[[solid.edge(name).ends for name in rim.edges]].mean(1)
     free = float(np.linalg.norm(middles - rim.centre, axis=1).min())
     return Bore(rim, length, tuple(faces.tolist()), free)
+
+
+@lru_cache(maxsize=8)
+def alone(bodies: Solid, solid: Solid, floor: Floor | None) -> tuple[int, ...]:
+    """Facets of a solid's bores that see nothing but their own wall and darkness, of some bodies on a floor."""
+    return tuple(sorted({face for bore in bores(solid) if _is_alone(bodies, bore, floor) for face in bore.faces}))
+
+
+def _is_alone(bodies: Solid, bore: Bore, floor: Floor | None) -> bool:
+    points, normals = (part.reshape(-1, 3) for part in _on_wall(bore, (np.arange(_DEEP) + 0.5) / _DEEP * bore.length))
+    ways = ways_about(normals, (in_unit_square(_LOOKS) + shifts(len(points))[:, None]) % 1.0)
+    face, _ = first_face(bodies, np.broadcast_to(points[:, None], ways.shape), ways, ())
+    out = ~np.isin(face, bore.faces)
+    return not (out & ((face >= 0) | (floor is not None) & (ways[..., 2] < 0))).any()
 
 
 def light_in_bore(
@@ -143,7 +158,9 @@ def _from_outside(bore: Bore, exchange: Exchange) -> tuple[Hits, Hits]:
     found = []
     for depth in ((np.arange(_DEEP) + 0.5) / _DEEP, _form_factors(bore.rim.radius / bore.length)[2]):
         points, normals = (part.reshape(-1, 3) for part in _on_wall(bore, depth * bore.length))
-        found.append(exchange.met(points, normals, _rays(exchange), shifts(len(points))))
+        met = exchange.met(points, normals, _rays(exchange), shifts(len(points)))
+        outside = ~np.isin(met.faces, bore.faces)
+        found.append(Hits(*(each[outside] for each in met)))
     return found[0], found[1]
 
 

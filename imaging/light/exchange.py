@@ -1,12 +1,13 @@
 """Light that faces send to each other, by radiosity: of an inner edge, a step, a pocket, an obstacle, the floor.
 
-Faces on the convex hull of all bodies see no other, but the floor where they do not look up, and walls of round through
-holes have a closed form (`imaging.light.bore`). The others, however many, have places spread evenly over them, each
-of which stands for a patch: what is nearer to it than to others and looks the same way, so that facets of a fillet
-share one. Where light is told roughly, a patch is that of many places. Rays tell once for a solid which share of what a
-patch sees is each other one; the patches exchange light by it. What arrives on a face is gathered when it is asked for,
-by rays from nodes of it: what they meet sends its share of the light that falls there, and of what its patch has from
-the others.
+Faces on the convex hull of all bodies see no other, but the floor where they do not look up. What walls of round
+through holes have from themselves has a closed form (`imaging.light.bore`), but others see them as they see all faces.
+All that see others, however many, have places spread evenly over them, each of which stands for a patch: what is nearer
+to it than to others and looks the same way, so that facets of a fillet share one. Where light is told roughly, a patch
+is that of many places. Rays tell once for a solid which share of what a patch sees is each other one, and where they
+end the lights' own light is asked for; the patches exchange light by it. What arrives on a face is gathered when it is
+asked for, by rays from nodes of it: what they meet sends its share of the light that falls there, and of what its patch
+has from the others.
 
 Rays follow Lambert's cosine and a low-discrepancy sequence: a share is off by about their number to the power -0.75,
 and all shares of a place add to 1.
@@ -28,6 +29,7 @@ from imaging.light.irradiance import beam
 from imaging.light.kept import kept
 from imaging.light.nodes import Frame, along, frame_of, goes_on, onto
 from imaging.light.places import Places, areas_of, in_unit_square, middles_of, shift_of, shifts, ways_about
+from imaging.light.walls import Wall, wall
 from scenes import Circle, Floor, Scene, Solid
 from scenes.parts.shading import normals_at
 from scenes.parts.solid import assembled
@@ -40,8 +42,9 @@ if TYPE_CHECKING:
 _CELLS = 400  # of the whole body
 _RIM_CELLS, _RIM_SCALE = 400, 0.5  # as many places more beside measured rims, and cells that count as one there
 _PLACES, _RAYS = 15, 32  # of a cell, about, and from each of them; an odd number, or some are midway between two
-_LIT = 4  # times as many places tell what falls on patches where rims are measured: through a hole it is a small spot
 _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
+_FROM_RIM = 4096  # of a node beside a measured rim
+_FROM_WALL = 1024  # of a curved surface all of whose facets are told together
 _FROM_PIECE = 32  # of a place that sends light on
 _BOUNCES, _LEFT = 200, 1e-9  # at most, and part of the light that is left after the last one
 _ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly, by patches of a cell
@@ -69,6 +72,7 @@ class Hits(NamedTuple):
     patches: np.ndarray
 
 
+NOT_TOLD = -1
 NOTHING_MET = Hits(*(np.zeros((0, 3) if name == "points" else 0) for name in Hits._fields))
 
 
@@ -124,6 +128,23 @@ class Exchange:
         np.maximum.at(high, self.solid.triangle_faces, self.solid.triangles.max(1))
         return self.roughly & (np.linalg.norm(high - low, axis=1) < self.cell)
 
+    def wall(self, number: int) -> Wall | None:
+        """The curved surface of a number below -1 (`told_as`)."""
+        return wall(self.solid, -2 - number, _apart(self))
+
+    def told_as(self, faces: np.ndarray) -> np.ndarray:
+        """Of which number the light on faces (n,) is told: their own, or their curved surface's, below -1; -1 where
+        none is."""
+        found = np.where(self.has[faces] & ~self.small[faces], faces, NOT_TOLD)
+        if self.solid.regions is None:
+            return found
+        curved = np.flatnonzero((found >= 0) & ~self.solid.plane[faces])
+        regions = self.solid.regions[faces[curved]]
+        for region in np.unique(regions).tolist():
+            if self.wall(-2 - region) is not None:
+                found[curved[regions == region]] = -2 - region
+        return found
+
     @cached_property
     def has(self) -> np.ndarray:
         """Whether a face is one of those, bool (F + 1,); the last says that nothing is not."""
@@ -131,24 +152,28 @@ class Exchange:
         found[self.faces] = True
         return found
 
+    @property
+    def rays(self) -> int:
+        """From each place."""
+        return _ROUGH_RAYS if self.roughly else _RAYS
+
+    @cached_property
+    def seen(self) -> Hits:
+        """What rays from all places meet."""
+        return self.met(self.places.points, self.places.normals, self.rays, shifts(len(self.places.points)))
+
     @cached_property
     def between(self) -> csr_matrix:
         """Form factors between patches, (p, p)."""
         from scipy.sparse import csr_matrix  # slow to load, and rarely needed
 
-        rays, count = _ROUGH_RAYS if self.roughly else _RAYS, self.tree.n
-        met = self.met(self.places.points, self.places.normals, rays, shifts(len(self.places.points)))
-        patches = self.patches[met.starts]
-        return csr_matrix((1 / (rays * np.bincount(self.patches)[patches]), (patches, met.patches)), (count, count))
+        patches, count = self.patches[self.seen.starts], self.tree.n
+        share = 1 / (self.rays * np.bincount(self.patches)[patches])
+        return csr_matrix((share, (patches, self.seen.patches)), (count, count))
 
-    @cached_property
-    def lit(self) -> tuple[Places, np.ndarray]:
-        """Places that tell the light that falls on patches, and the patch of each."""
-        if not self.rims:
-            return self.places, self.patches
-        more = Places.spread(self.solid, self.faces, _LIT * len(self.places.points), after=len(self.places.points))
-        patches = self.tree.query(_placed(more.points, more.normals, self.scale))[1]
-        return self.places.joined(more), np.concatenate([self.patches, patches])
+    def of_patches(self, values: np.ndarray) -> np.ndarray:
+        """Means (p,) over the patches of what there is at places (m,)."""
+        return np.bincount(self.patches, values) / np.bincount(self.patches)
 
     def met(self, points: np.ndarray, normals: np.ndarray, rays: int, shifted: np.ndarray = np.zeros(2)) -> Hits:
         """What so many rays from each of points (n, 3) of unit normals meet.
@@ -195,7 +220,7 @@ class Sheet:
     ``met`` is what so many ``rays`` from each of them meet.
     """
 
-    frame: Frame | Annulus
+    frame: Frame | Annulus | Wall
     u: np.ndarray
     v: np.ndarray
     met: Hits
@@ -242,9 +267,9 @@ class Exchanged:
             left[here] -= share
             if here.size:
                 yield number, here, share
-        for face, here in _by_face(faces):
+        for face, here in _by_face(exchange.told_as(faces)):
             here = here[left[here] > 0]
-            if here.size and exchange.has[face] and not exchange.small[face]:
+            if here.size and face != NOT_TOLD:
                 yield face, here, left[here]
 
     @cached_property
@@ -272,21 +297,15 @@ class Exchanged:
 
         Of several emitters each is asked for every so manieth ray.
         """
-        solid, several = self.exchange.solid, len(self.emitters)
-        direct = np.zeros(len(met.points))
-        for k, emitter in enumerate(self.emitters):
-            asked = met.rays % several == k
-            direct[asked] = several * _arriving(
-                self.scene, emitter, met.points[asked], normals_at(solid, met.faces[asked], met.points[asked])
-            )
+        direct = _direct(self.scene, self.emitters, self.exchange.solid, met)
         sent = _white(self.scene, met.faces) * (direct + self.arriving[met.patches])
         return np.bincount(met.starts, sent, count) / rays
 
 
 def _by_face(faces: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Each of the faces (n,) and where it stands, in rising order."""
+    """Each of the numbers (n,) and where it stands, in rising order."""
     order = np.argsort(faces, kind="stable")
-    starts = np.flatnonzero(np.diff(faces[order], prepend=-2))
+    starts = np.flatnonzero(np.append(faces.size > 0, np.diff(faces[order])))
     for here in np.split(order, starts[1:]):
         if here.size:
             yield int(faces[here[0]]), here
@@ -296,7 +315,7 @@ def _by_face(faces: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
 class Told:
     """What arrives on a face, by places in the rectangle about it, or beside a rim."""
 
-    frame: Frame | Annulus
+    frame: Frame | Annulus | Wall
     values: RectBivariateSpline
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -349,8 +368,8 @@ def room(bodies: Solid, floor: Floor | None) -> Solid:
 
 @lru_cache(maxsize=4)
 def exchange_of(
-    bodies: Solid, without: tuple[int, ...], floor: Floor | None = None, roughly: bool = False,
-    rims: tuple[Circle, ...] = (),
+    bodies: Solid, floor: Floor | None = None, roughly: bool = False, rims: tuple[Circle, ...] = (),
+    without: tuple[int, ...] = (),
 ) -> Exchange | None:  # fmt: skip
     """Of the faces that see others, those ``without`` left out; None where fewer than two do.
 
@@ -395,8 +414,7 @@ def _placed(points: np.ndarray, normals: np.ndarray, cell: float) -> np.ndarray:
 @kept(most=2048)
 def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
     """Of faces, those of as many rays a node looked at together."""
-    beside = exchange.annuli
-    bare = [_nodes_beside(exchange, beside[face]) if face in beside else _nodes(exchange, face) for face in faces]
+    bare = [_bare(exchange, face) for face in faces]
     found: dict[int, Hits] = {}
     for many in dict.fromkeys(sheet.rays for sheet, *_ in bare):
         which = [k for k, (sheet, *_) in enumerate(bare) if sheet.rays == many]
@@ -407,6 +425,15 @@ def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
             part = slice(*np.searchsorted(met.starts, [start, start + count]))
             found[k] = Hits(*(each[part].copy() for each in met._replace(starts=met.starts - start)))
     return (replace(sheet, met=found[k]) for k, (sheet, *_) in enumerate(bare))
+
+
+def _bare(exchange: Exchange, number: int) -> tuple[Sheet, np.ndarray, np.ndarray, np.ndarray]:
+    """A sheet with nothing met yet, its nodes, their normals (n, 3) and their rays' shifts (n, 2)."""
+    if number < NOT_TOLD:
+        return _nodes_around(exchange, exchange.wall(number))
+    if number in exchange.annuli:
+        return _nodes_beside(exchange, exchange.annuli[number])
+    return _nodes(exchange, number)
 
 
 def _apart(exchange: Exchange) -> float:
@@ -438,30 +465,39 @@ def _nodes_beside(exchange: Exchange, annulus: Annulus) -> tuple[Sheet, np.ndarr
     """The same beside a rim, each node's rays shifted by themselves."""
     face, rings = annulus.circle.face, annulus.rings
     nodes = onto(exchange.solid, face, annulus.nodes(), _WITHIN * annulus.width)
-    sheet = Sheet(annulus, np.arange(annulus.count), rings, NOTHING_MET, _FROM_NODE)
+    sheet = Sheet(annulus, np.arange(annulus.count), rings, NOTHING_MET, _FROM_RIM)
     return sheet, nodes, np.broadcast_to(exchange.solid.normals[face], nodes.shape), shifts(len(nodes))
+
+
+def _nodes_around(exchange: Exchange, wall: Wall) -> tuple[Sheet, np.ndarray, np.ndarray, np.ndarray]:
+    """The same of a curved surface, whose nodes have its own normals."""
+    nodes, faces = wall.nodes()
+    rays = _ROUGH_NODE if exchange.roughly else _FROM_WALL
+    sheet = Sheet(wall, np.arange(wall.count), wall.rows, NOTHING_MET, rays)
+    return sheet, nodes, normals_at(exchange.solid, faces, nodes), shifts(len(nodes))
 
 
 @lru_cache(maxsize=8)
 def exchanged(
-    scene: Scene, emitters: tuple[Emitter, ...], without: tuple[int, ...], roughly: bool = False
+    scene: Scene, emitters: tuple[Emitter, ...], roughly: bool = False, without: tuple[int, ...] = ()
 ) -> Exchanged | None:
-    """What the faces of a scene's bodies and its floor send to each other under some emitters."""
+    """What the faces of a scene's bodies and its floor send to each other under some emitters, some left out."""
     rims = () if roughly else measured_rims(scene)
-    exchange = exchange_of(scene.bodies, without, scene.bright_floor, roughly, rims)
+    exchange = exchange_of(scene.bodies, scene.bright_floor, roughly, rims, without)
     if exchange is None:
         return None
-    places, patches = exchange.lit
-    white, normals = _white(scene, places.faces), normals_at(exchange.solid, places.faces, places.points)
-    direct = sum(_arriving(scene, each, places.points, normals) for each in emitters)
-    whites, lit = (np.bincount(patches, values) / np.bincount(patches) for values in (white, white * direct))
-    sent = more = lit
+    met = exchange.seen
+    several = met._replace(rays=np.arange(len(met.rays)))  # of few rays from a place no emitter is asked for none
+    lit = _white(scene, met.faces) * _direct(scene, emitters, exchange.solid, several)
+    whites = exchange.of_patches(_white(scene, exchange.places.faces))
+    once = exchange.of_patches(np.bincount(met.starts, lit, len(exchange.patches)) / exchange.rays)
+    arriving = more = once
     for _ in range(_BOUNCES):
-        more = whites * (exchange.between @ more)
-        sent = sent + more
-        if more.max() <= _LEFT * sent.max():
+        more = exchange.between @ (whites * more)
+        arriving = arriving + more
+        if more.max() <= _LEFT * arriving.max():
             break
-    return Exchanged(scene, emitters, exchange, exchange.between @ sent)
+    return Exchanged(scene, emitters, exchange, arriving)
 
 
 def once_reflected(
@@ -485,6 +521,16 @@ def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
     """Diffuse reflectance of faces (n,)."""
     white = np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds]
     return np.append(white, 0.0 if scene.floor is None else scene.floor.reflectance)[faces]
+
+
+def _direct(scene: Scene, emitters: tuple[Emitter, ...], solid: Solid, met: Hits) -> np.ndarray:
+    """Irradiance from emitters where rays end, (k,); of several each is asked for every so manieth ray."""
+    found, several = np.zeros(len(met.points)), len(emitters)
+    for k, emitter in enumerate(emitters):
+        asked = met.rays % several == k
+        normals = normals_at(solid, met.faces[asked], met.points[asked])
+        found[asked] = several * _arriving(scene, emitter, met.points[asked], normals)
+    return found
 
 
 def _arriving(scene: Scene, emitter: Emitter, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -50,7 +50,7 @@ def senders(picture: Picture) -> Senders | None:
     """Of diffuse faces under the picture's lights; None where no two of them see each other."""
     scene = picture.scene
     shining = tuple(plain(each) for each in emitters(scene, Pictures.of(picture).lights, GLANCE))
-    light = exchanged(scene, shining, ())
+    light = exchanged(scene, shining)
     if light is None:
         return None
     exchange = light.exchange

@@ -87,7 +87,7 @@ def test_the_ground_beside_a_rim_has_the_light_that_paths_tell(cup, monkeypatch)
     def off():
         for each in (exchange.exchanged, exchange.exchange_of):
             each.cache_clear()
-        return exchange.exchanged(scene, (shining,), ()).at(points, faces) / expected - 1
+        return exchange.exchanged(scene, (shining,)).at(points, faces) / expected - 1
 
     assert np.sqrt(np.mean(off() ** 2)) < 0.06  # margin: twice what is measured; 2.8 %
     monkeypatch.setattr(exchange, "measured_rims", lambda scene: ())
@@ -106,7 +106,7 @@ def test_the_ground_about_an_inner_edge_has_the_light_that_paths_tell(tmp_path):
     points = rim.centre + (rim.radius + 0.15) * rim.spokes(rim.angles(24))
     white, rng = scene.material.diffuse(), np.random.default_rng(1)
     paths = traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng) * shining.power
-    told = exchange.exchanged(scene, (shining,), ()).at(points, np.full(24, rim.face))
+    told = exchange.exchanged(scene, (shining,)).at(points, np.full(24, rim.face))
     assert np.sqrt(np.mean((told / paths - 1) ** 2)) < 0.075  # margin: twice what is measured; 3.6 %
 
 
@@ -123,7 +123,7 @@ def test_light_that_met_several_faces_is_as_paths_tell(tmp_path, monkeypatch):
     paths = traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng).mean() * shining.power
     monkeypatch.setattr(exchange, "measured_rims", lambda scene: scene.solid.rims)
     exchange.exchanged.cache_clear()
-    light = exchange.exchanged(scene, (shining,), ())
+    light = exchange.exchanged(scene, (shining,))
     exchange.exchanged.cache_clear()
     met = light.exchange.met(points, np.broadcast_to(rim.axis, points.shape), 1 << 12)
     told = light.gathered(met, 24, 1 << 12).mean()

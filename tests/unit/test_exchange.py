@@ -9,7 +9,7 @@ import trimesh
 
 import scenes
 from imaging.light import exchange as exchange_module
-from imaging.light.between import _of_faces, light_between
+from imaging.light.between import light_between
 from imaging.light.bore import _form_factors, _is_wall, bores
 from imaging.light.emitters import emitters, plain
 from imaging.light.exchange import Hits, _arriving, _nodes, exchange_of, exchanged, room
@@ -78,7 +78,7 @@ _FEW_RAYS = 5 * _RAYS**-0.75  # a low-discrepancy sequence's error
 def test_plates_at_a_right_angle(away, along):
     """A point y before a corner of an upright w x h: (atan(w / y) - y / s atan(w / s)) / 2 pi, s^2 = y^2 + h^2."""
     solid = scenes.load("bracket").solid
-    exchange = exchange_of(solid, ())
+    exchange = exchange_of(solid)
     wall = next(f for f in exchange.faces if abs(solid.normals[f, 2]) < 0.5)
     corners = solid.vertices[list(solid.faces[wall])]
     side = np.cross(solid.normals[wall], [0, 0, 1])
@@ -101,7 +101,7 @@ def test_a_blind_hole_sees_the_sky_through_its_mouth():
         [(0, 0), (6, 0), (6, 1 + deep), (radius, 1 + deep), (radius, 1), (0, 1)], sections=96
     )
     solid = mesh_solid(cup)
-    exchange = exchange_of(solid, ())
+    exchange = exchange_of(solid)
     bottom = next(f for f in exchange.faces if solid.normals[f, 2] > 0.5)
     found = len(exchange.met(np.array([[0.0, 0.0, 1.0]]), solid.normals[[bottom]], _RAYS).rays) / _RAYS
     flats = 1 - np.cos(np.pi / 96)  # how far the middles of its 96 facets stand within
@@ -113,7 +113,7 @@ def test_a_cavity_sees_itself_alone():
     inner = trimesh.creation.box((3.0, 4.0, 1.0))
     inner.invert()
     solid = mesh_solid(trimesh.util.concatenate([trimesh.creation.box((5.0, 6.0, 4.0)), inner]))
-    exchange = exchange_of(solid, ())
+    exchange = exchange_of(solid)
     between = exchange.between.toarray()
     assert between.sum(1) == pytest.approx(1.0, abs=1e-12)
     of_patch = [np.bincount(exchange.places.faces[exchange.patches == k]).argmax() for k in range(exchange.tree.n)]
@@ -133,7 +133,7 @@ def test_a_cavity_sees_itself_alone():
 
 def test_many_points_see_what_each_of_them_does():
     """What is asked in several parts, for they are many rays."""
-    exchange = exchange_of(scenes.load("bracket").solid, ())
+    exchange = exchange_of(scenes.load("bracket").solid)
     points, normals = exchange.places.points[:70], exchange.places.normals[:70]
     whole = exchange.met(points, normals, 4096)
     assert whole.starts.max() > 200_000 // 4096
@@ -159,11 +159,11 @@ def test_what_rays_gather():
         )
         for pose in ((30.0, 80.0), (50.0, -100.0))
     ]
-    both = exchanged(scene, shining[0] + shining[1], ())
-    one, two = (exchanged(scene, each, ()) for each in shining)
-    assert both.arriving == pytest.approx(
-        one.arriving + two.arriving, rel=1e-7
-    )  # bounces are summed until 1e-9 is left
+    both = exchanged(scene, shining[0] + shining[1])
+    one, two = (exchanged(scene, each) for each in shining)
+    apart = np.abs(both.arriving - one.arriving - two.arriving).mean() / both.arriving.mean()
+    assert 1e-6 < apart < 0.1  # margin: twice what is measured, for each patch has half of the rays of each light
+    assert both.arriving.mean() == pytest.approx((one.arriving + two.arriving).mean(), rel=0.002)  # margin: 0.0009
     exchange, places = both.exchange, both.exchange.places
     here = [3, 500, 2500, 5000]
     met = Hits(
@@ -184,7 +184,7 @@ def slot_end(tmp_path_factory):
     shining = tuple(map(plain, emitters(scene, Pictures.of(scene, (28, 80), (35, 335)).lights, GLANCE)))
     arc = next(arc for arc in scene.solid.arcs if arc.name == "c2")
     walls = [next(f for f in scene.solid.edge(name).faces if f != arc.face) for name in arc.edges]
-    return _of_faces(scene, shining), walls[8:48:5], np.array([0.05, 0.3, 0.6, 1.0, 1.5, 2.0])
+    return exchanged(scene, shining), walls[8:48:5], np.array([0.05, 0.3, 0.6, 1.0, 1.5, 2.0])
 
 
 def _told_beside_many_rays(slot_end):
@@ -211,7 +211,7 @@ def test_a_round_wall_is_told_as_many_rays_tell_it(slot_end):
 
 def test_few_rays_tell_a_round_wall_wrongly(slot_end, monkeypatch):
     """The control of the test above: an eighth of the rays are off by more than it allows."""
-    monkeypatch.setattr(exchange_module, "_FROM_NODE", 128)
+    monkeypatch.setattr(exchange_module, "_FROM_WALL", 128)
     for kept in (exchange_module._sheets, exchange_module._told):
         kept.cache_clear()
     told, expected = _told_beside_many_rays(slot_end)
@@ -255,7 +255,7 @@ def test_light_that_is_told_roughly_is_near(part, tmp_path):
     scene = _cup(tmp_path) if part == "cup" else scenes.load(part)
     pictures = Pictures.of(scene, (40, 20), (30, 100))
     shining = tuple(plain(emitter) for emitter in emitters(scene, pictures.lights, GLANCE))
-    exact, rough = (_of_faces(scene, shining, roughly) for roughly in (False, True))
+    exact, rough = (exchanged(scene, shining, roughly) for roughly in (False, True))
     places = Places.spread(exact.exchange.solid, exact.exchange.faces, 500)
     there, found = (each.at(places.points, places.faces) for each in (exact, rough))
     assert rough.exchange.small[places.faces].any() == (part == "cup")

@@ -28,7 +28,7 @@ def areas(triangles):
 def test_pieces_cover_all_faces(picture):
     """Each face's pieces are its area, and lie in it; those of faces that see others are no larger than cells."""
     found = senders(picture)
-    exchange = exchange_of(picture.scene.bodies, (), picture.scene.bright_floor)
+    exchange = exchange_of(picture.scene.bodies, picture.scene.bright_floor)
     solid, sides = exchange.solid, np.linalg.norm(found.triangles - np.roll(found.triangles, 1, 1), axis=-1).max(1)
     whole = np.bincount(solid.triangle_faces, areas(solid.triangles))
     assert np.bincount(found.faces, areas(found.triangles)) == pytest.approx(whole, rel=1e-9)
@@ -48,7 +48,7 @@ def in_the_gap(picture, count, rng):
     middle = found.triangles.mean(1)
     inside = (middle[:, 0] > -1) & (middle[:, 0] < 0) | (np.abs(middle[:, 0] + 0.5) < 0.5001)
     inside &= (middle[:, 1] > 0) & (middle[:, 1] < 7.5) & (middle[:, 2] < 2.5)
-    inside &= exchange_of(picture.scene.bodies, (), picture.scene.bright_floor).has[found.faces]
+    inside &= exchange_of(picture.scene.bodies, picture.scene.bright_floor).has[found.faces]
     some = np.flatnonzero(inside)
     size = areas(found.triangles[some])
     return found, rng.choice(some, count, p=size / size.sum()), rng.dirichlet(np.ones(3), count)

@@ -108,12 +108,14 @@ def test_each_face_lends_light_by_its_own_reflectance():
     dull = scenes.FaceMaterial(name="dull", faces=tuple(inner[:1]), diffuse_reflectance=0.2)
 
     def found_in(scene):
-        found = exchanged(scene, shining, ())
-        places, patches = found.exchange.places, found.exchange.patches
-        white = np.array([scene.surfaces.of(face).diffuse() for face in places.faces])
-        direct = _arriving(scene, *shining, places.points, places.normals)
-        sent = np.bincount(patches, white * (direct + found.arriving[patches])) / np.bincount(patches)
-        return found.arriving - found.exchange.between.dot(sent), found.arriving
+        found = exchanged(scene, shining)
+        seen, exchange = found.exchange.seen, found.exchange
+        white = np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds]
+        direct = _arriving(scene, *shining, seen.points, exchange.solid.normals[seen.faces])
+        once = np.bincount(seen.starts, white[seen.faces] * direct, len(exchange.patches)) / exchange.rays
+        places = exchange.places.faces
+        again = exchange.between.dot(exchange.of_patches(white[places]) * found.arriving)
+        return found.arriving - exchange.of_patches(once) - again, found.arriving
 
     (left, plain), (rest, painted) = map(found_in, (bracket, changed(bracket, materials=(dull,))))
     assert np.abs([left, rest]).max() < 1e-8 * plain.max()  # bounces are summed until 1e-9 is left
