@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter
 
 from imaging.features.limb_outline import limb_outline
 from imaging.geometry.lens import image_centre
+from imaging.geometry.measured import measured_pieces
 from imaging.geometry.projection import project, project_ideal
 from scenes import Curved, Picture
 
@@ -30,11 +31,8 @@ def _near_required(
 ) -> np.ndarray:
     """The same of a crop of whole pixels: all lights and rays share it."""
     scene, (top, left) = picture.scene, corner
-    circles = {circle.name: circle.edges for circle in scene.solid.rims}
     limbs = [each for each in scene.solid.curved if each.name in scene.required]
-    circles |= dict.fromkeys((each.name for each in limbs), ())
-    names = [piece for name in scene.required for piece in circles.get(name, (name,))]
-    ends = scene.solid.vertices[np.array([scene.solid.edge(name).ends for name in names], int).reshape(-1, 2)]
+    ends = measured_pieces(scene)
     places = np.linspace(ends[:, 0], ends[:, 1], 2 + max(shape)).reshape(-1, 3)
     sensor = np.array(list(picture.sensor))
     seen = (project, project_ideal) if scene.camera.lens.bends else (project,)  # rendered by a pinhole, bent after

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from imaging.geometry.measured import measured_pieces
 from imaging.light.emitters import emitters, plain
 from imaging.light.exchange import Exchange, exchanged
 from imaging.light.places import shifts
@@ -17,8 +18,10 @@ from scenes.lights import GLANCE
 from scenes.parts.rows import different
 from scenes.parts.shading import normals_at
 
-_OF_WAY = 0.5  # of the way to what it sees nearest: the side of a piece
-_FINER, _LOOKS = 4.0, 16  # times smaller than cells it is at most; rays that look for it
+_OF_WAY = 0.7  # of the way to what it sees nearest: the side of a piece
+_LOOKS = 4  # rays that look for it from the middle of a piece and from each corner
+_FINER, _FINEST = 4.0, 16.0  # times smaller than cells pieces are at most, and beside what is measured
+_OF_DISTANCE = 0.5  # of that from what is measured: so small pieces may be there
 _WITHIN = 0.02  # of the way from a corner to the middle
 _SAME = 1e-6  # of a cell, and of a unit normal: corners nearer to each other are one
 
@@ -54,24 +57,37 @@ def senders(picture: Picture) -> Senders | None:
     if light is None:
         return None
     exchange = light.exchange
-    triangles, faces = _pieces(exchange)
+    triangles, faces = _pieces(exchange, measured_pieces(scene))
     normals = np.broadcast_to(normals_at(exchange.solid, faces[:, None], triangles), triangles.shape)
     points, owners, which = _places(triangles, normals, faces, scene.surfaces.kinds, exchange.cell)
     return Senders(triangles, normals, faces, scene.camera.exposure * light.sent_at(points, owners)[which])
 
 
-def _pieces(exchange: Exchange) -> tuple[np.ndarray, np.ndarray]:
+def _pieces(exchange: Exchange, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (n, 3, 3) of all faces, and the face of each: no larger than cells, and smaller the nearer what they
-    see is."""
+    see is; beside what is ``measured``, edges from end to end (k, 2, 3), smaller than elsewhere."""
+    away = _distance(measured, exchange.cell / _FINEST)
 
     def limit(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
         return np.where(exchange.has[faces], exchange.cell, np.inf)
 
     def less(triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        near = np.maximum(_OF_WAY * _nearest(exchange, triangles.mean(1), faces), exchange.cell / _FINER)
+        least = exchange.cell / np.array([_FINEST, _FINER])
+        least = np.clip(_OF_DISTANCE * away(_looking(triangles)).min(1), *least)
+        near = np.maximum(_OF_WAY * _nearest(exchange, triangles, faces), least)
         return np.minimum(near, limit(triangles, faces))
 
     return _halved(*_halved(exchange.solid.triangles, exchange.solid.triangle_faces, limit), less)
+
+
+def _distance(edges: np.ndarray, apart: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Of points (..., 3) from the nearest of edges (k, 2, 3), (...), to about half of ``apart``; infinite from none."""
+    from scipy.spatial import KDTree  # slow to load, and rarely needed
+
+    counts = np.ceil(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1) / apart).astype(int) + 1
+    places = [np.linspace(*ends, count) for ends, count in zip(edges, counts, strict=True)]
+    tree = KDTree(np.concatenate([np.zeros((0, 3)), *places]))
+    return lambda points: tree.query(points)[0]
 
 
 def _halved(
@@ -92,13 +108,28 @@ def _halved(
     return np.concatenate(found), np.concatenate(owners)
 
 
-def _nearest(exchange: Exchange, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """How far the nearest of what points (n, 3) within faces (n,) see is, (n,); infinite where that is nothing."""
-    found, some = np.full(len(points), np.inf), np.flatnonzero(exchange.has[faces])
-    normals = exchange.solid.normals[faces[some]]
-    met = exchange.met(points[some], normals, _LOOKS, shifts(len(some)))
-    np.minimum.at(found, some[met.starts], np.linalg.norm(met.points - points[some[met.starts]], axis=1))
+def _nearest(exchange: Exchange, triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """How far the nearest of what triangles (n, 3, 3) of faces (n,) see is, (n,); infinite where that is nothing.
+
+    They look from their corners, too: from its middle one whose side lies at the foot of a narrow step rarely sees it.
+    """
+    found, some = np.full(len(triangles), np.inf), np.flatnonzero(exchange.has[faces])
+    points = _looking(triangles[some])
+    looking, points = np.repeat(some, points.shape[1]), points.reshape(-1, 3)
+    met = exchange.met(points, exchange.solid.normals[faces[looking]], _LOOKS, shifts(len(points)))
+    np.minimum.at(found, looking[met.starts], np.linalg.norm(met.points - points[met.starts], axis=1))
     return found
+
+
+def _looking(triangles: np.ndarray) -> np.ndarray:
+    """Places of triangles (n, 3, 3) that look at others: beside their corners, and their middles, (n, 4, 3)."""
+    return np.concatenate([_inner(triangles), triangles.mean(1, keepdims=True)], 1)
+
+
+def _inner(triangles: np.ndarray) -> np.ndarray:
+    """Places a little within triangles (n, 3, 3) that stand for their corners: in an inner edge light comes from both
+    sides."""
+    return triangles + _WITHIN * (triangles.mean(1, keepdims=True) - triangles)
 
 
 def _places(
@@ -111,7 +142,7 @@ def _places(
     owners = np.repeat(faces, 3)
     same = np.column_stack([triangles.reshape(-1, 3) / cell, normals.reshape(-1, 3), np.append(kinds, -1.0)[owners]])
     rows, which = different(np.rint(same / _SAME))
-    inner = (triangles + _WITHIN * (triangles.mean(1, keepdims=True) - triangles)).reshape(-1, 3)
+    inner = _inner(triangles).reshape(-1, 3)
     points = np.column_stack([np.bincount(which, axis) for axis in inner.T]) / np.bincount(which)[:, None]
     some = np.zeros(len(rows), int)
     some[which] = owners
