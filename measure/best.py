@@ -30,9 +30,9 @@ def best_estimator(scene: Scene | Picture) -> str:
 def other_estimators(scene: Scene) -> tuple[str, ...]:
     """What may know more of some values where the best one does not know enough, the quickest first.
 
-    ``isophote`` reads less far beside an edge, and ``strip`` finds levels where ``gradient`` finds slopes: what a shadow
-    or a bright face nearby does to the one, and how much of it follows a reflectance that is not known, is not what it
-    does to the other.
+    ``isophote`` reads less far beside an edge, and ``strip`` finds levels where ``gradient`` finds slopes: what a
+    shadow or a bright face nearby does to the one, and how much of it follows a reflectance that is not known, is not
+    what it does to the other.
     """
     return tuple(name for name in _OTHERWISE if is_for(name, scene.noise))
 
