@@ -98,7 +98,7 @@ def otherwise(stored: Kept, runs: dict[str, dict[str, list[Call]]]) -> set[Entry
         for function, cases in stored.items()
         for case, lines in cases.items()
         for k, way in enumerate(_WAYS)
-        if list(_of_function(function, _alone(lines, k), runs[case].get(function)))
+        if list(_of_function(function, _alone(lines, k), runs.get(case, {}).get(function)))
     }
 
 
@@ -115,6 +115,20 @@ def loosened(stored: Kept, apart: set[Entry]) -> Kept:
             if left != [_NO] * len(left):
                 found.setdefault(function, {})[case] = left
     return found
+
+
+def still(found: Kept, before: Kept, changed: set[Entry]) -> Kept:
+    """What is found; what has not changed as it was stored before, no more exact than other processors made it."""
+    return {
+        function: {
+            case: [
+                each if (function, case, way) in changed else old
+                for each, old, way in zip(lines, before.get(function, {}).get(case, lines), _WAYS, strict=True)
+            ]
+            for case, lines in cases.items()
+        }
+        for function, cases in found.items()
+    }
 
 
 def line(runs: list[list[Digest]]) -> str:

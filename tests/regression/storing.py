@@ -22,7 +22,20 @@ from typing import Any
 
 from tests.machines import HASWELL, KERNELS, OLD, SANDY, Machine, libraries
 from tests.regression.digest import Digest
-from tests.regression.kept import APART, STORED, Entry, Kept, by_case, chosen, entries, kept, loosened, otherwise, read
+from tests.regression.kept import (
+    APART,
+    STORED,
+    Entry,
+    Kept,
+    by_case,
+    chosen,
+    entries,
+    kept,
+    loosened,
+    otherwise,
+    read,
+    still,
+)
 from tests.regression.returns import PACKAGES, ROOT, recorded
 
 _CLOCKS = "time", "perf_counter", "process_time", "monotonic"
@@ -57,7 +70,9 @@ def store(choose: bool) -> None:
         folder = Path(name)
         cases = sorted(_choice(folder) if choose or not STORED.exists() else by_case(STORED))
         folders = [folder / str(number) for number in range(len(WAYS))]
-        found = kept(list(executor.map(_run, WAYS, [cases] * len(WAYS), folders)))
+        runs = list(executor.map(_run, WAYS, [cases] * len(WAYS), folders))
+    before = read(STORED)
+    found = still(kept(runs), before, otherwise(before, runs[0]))
     _write(loosened(found, entries(APART)))
 
 

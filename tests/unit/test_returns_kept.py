@@ -169,6 +169,19 @@ def test_what_one_more_processor_gives_otherwise_is_left_out():
     assert told.get(RATIO, {"case": ["-", "-"]}) == {"case": ["-", way]}
 
 
+def test_what_has_not_changed_stays_as_it_was_stored():
+    """As exactly as before; what has changed is stored as it is found."""
+    before, now = {f: {"case": lines} for f, lines in stored(interval).items()}, {"case": calls_of(interval)}
+    first, way = before[RATIO]["case"]
+    loose = before | {RATIO: {"case": ["-", way]}}
+    assert kept.still(before, loose, kept.otherwise(loose, now)) == loose
+    digits = first.split()
+    other = " ".join([*digits[:2], "00000000" + digits[2][8:]])
+    changed = before | {RATIO: {"case": [other, "-"]}}
+    assert kept.still(before, changed, kept.otherwise(changed, now))[RATIO] == {"case": [first, "-"]}
+    assert kept.still(before, {}, set()) == before
+
+
 def test_what_processors_give_otherwise_is_not_stored():
     """What was told apart once stays out when returns are stored anew on one processor."""
     apart = kept.entries(kept.APART)
