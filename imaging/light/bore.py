@@ -158,9 +158,7 @@ def _from_outside(bore: Bore, exchange: Exchange) -> tuple[Hits, Hits]:
     found = []
     for depth in ((np.arange(_DEEP) + 0.5) / _DEEP, _form_factors(bore.rim.radius / bore.length)[2]):
         points, normals = (part.reshape(-1, 3) for part in _on_wall(bore, depth * bore.length))
-        met = exchange.met(points, normals, _rays(exchange), shifts(len(points)))
-        outside = ~np.isin(met.faces, bore.faces)
-        found.append(Hits(*(each[outside] for each in met)))
+        found.append(exchange.met(points, normals, _rays(exchange), shifts(len(points)), bore.faces))
     return found[0], found[1]
 
 

@@ -57,7 +57,8 @@ _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; b
 _FLOOR_CELLS = 400  # of it, besides those of the bodies
 _UP = 1 - 1e-9  # cosine of a normal that sees no floor
 _AT_ONCE = 200_000  # rays
-_TOGETHER = 64  # faces
+_TOGETHER = 16  # faces
+_NUMBER = np.int32  # of what rays meet there are millions, which are kept
 _LIFT = 1e-6  # of the object's size: between a place and its own face
 _MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
 
@@ -73,7 +74,7 @@ class Hits(NamedTuple):
 
 
 NOT_TOLD = -1
-NOTHING_MET = Hits(*(np.zeros((0, 3) if name == "points" else 0) for name in Hits._fields))
+NOTHING_MET = Hits(*(np.zeros((0, 3)) if name == "points" else np.zeros(0, _NUMBER) for name in Hits._fields))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,8 +176,11 @@ class Exchange:
         """Means (p,) over the patches of what there is at places (m,)."""
         return np.bincount(self.patches, values) / np.bincount(self.patches)
 
-    def met(self, points: np.ndarray, normals: np.ndarray, rays: int, shifted: np.ndarray = np.zeros(2)) -> Hits:
-        """What so many rays from each of points (n, 3) of unit normals meet.
+    def met(
+        self, points: np.ndarray, normals: np.ndarray, rays: int, shifted: np.ndarray = np.zeros(2),
+        but: tuple[int, ...] = (),
+    ) -> Hits:  # fmt: skip
+        """What so many rays from each of points (n, 3) of unit normals meet, that which ends on faces ``but`` left out.
 
         Others where the unit square that they stand for is ``shifted`` otherwise, (2,) or (n, 2).
         """
@@ -184,21 +188,24 @@ class Exchange:
         parts = []
         for at in range(0, len(points), size):
             part = slice(at, at + size)
-            found = self._met(points[part], normals[part], (in_unit_square(rays) + shifted[part, None]) % 1.0)
+            found = self._met(points[part], normals[part], (in_unit_square(rays) + shifted[part, None]) % 1.0, but)
             parts.append(found._replace(starts=found.starts + at))
         return Hits(*map(np.concatenate, zip(*parts, strict=True)))
 
-    def _met(self, points: np.ndarray, normals: np.ndarray, square: np.ndarray) -> Hits:
+    def _met(self, points: np.ndarray, normals: np.ndarray, square: np.ndarray, but: tuple[int, ...]) -> Hits:
         ways = ways_about(normals, square)
         starts = np.broadcast_to((points + _LIFT * self.solid.extent * normals)[:, None], ways.shape)
         face, t = first_face(self.solid, starts, ways, (), margin=_MARGIN)
         if self.floor is not None:
             face, t = self._met_or_floor(face, t, starts, ways)
-        point, ray = np.nonzero(self.has[face])  # nothing met, -1, is the last
+        sends = self.has.copy()
+        sends[list(but)] = False
+        point, ray = np.nonzero(sends[face])  # nothing met, -1, is the last
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
         coordinates = _placed(places, self.solid.normals[face], self.scale)
-        return Hits(point, ray, places, face, self.tree.query(coordinates)[1])
+        point, ray, face, patch = (each.astype(_NUMBER) for each in (point, ray, face, self.tree.query(coordinates)[1]))
+        return Hits(point, ray, places, face, patch)
 
     def _met_or_floor(
         self, face: np.ndarray, t: np.ndarray, starts: np.ndarray, ways: np.ndarray
@@ -525,6 +532,14 @@ def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
 
 def _direct(scene: Scene, emitters: tuple[Emitter, ...], solid: Solid, met: Hits) -> np.ndarray:
     """Irradiance from emitters where rays end, (k,); of several each is asked for every so manieth ray."""
+    found = np.zeros(len(met.points))
+    for at in range(0, len(found), _AT_ONCE):  # in blocks, which bounds the memory
+        part = slice(at, at + _AT_ONCE)
+        found[part] = _direct_of_few(scene, emitters, solid, Hits(*(each[part] for each in met)))
+    return found
+
+
+def _direct_of_few(scene: Scene, emitters: tuple[Emitter, ...], solid: Solid, met: Hits) -> np.ndarray:
     found, several = np.zeros(len(met.points)), len(emitters)
     for k, emitter in enumerate(emitters):
         asked = met.rays % several == k

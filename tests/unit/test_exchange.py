@@ -144,6 +144,38 @@ def test_many_points_see_what_each_of_them_does():
         assert whole.faces[of_it].tolist() == alone.faces.tolist()
 
 
+def test_rays_that_end_on_some_faces_are_left_out():
+    """Of the same rays, what all others meet."""
+    exchange = exchange_of(scenes.load("bracket").solid)
+    points, normals = exchange.places.points[::100], exchange.places.normals[::100]
+    whole, some = exchange.met(points, normals, 64), tuple(exchange.faces[::2].tolist())
+    rest = exchange.met(points, normals, 64, but=some)
+    left = ~np.isin(whole.faces, some)
+    assert 0 < left.sum() < left.size
+    for every, those in zip(whole, rest, strict=True):
+        assert np.array_equal(every[left], those)
+
+
+def test_light_where_many_rays_end_is_asked_for_in_blocks(monkeypatch):
+    """Memory does not grow with the rays of many faces, and what each gathers is what it is otherwise."""
+    scene = scenes.load("bracket")
+    shining = tuple(plain(each) for each in emitters(scene, Pictures.of(scene, (40, 30), (30.0, 80.0)).lights, GLANCE))
+    light = exchanged(scene, shining)
+    exchange, sizes = light.exchange, []
+    met = exchange.met(exchange.places.points[:70], exchange.places.normals[:70], 64)
+    whole = light.gathered(met, 70, 64)
+
+    def counted(scene, emitter, points, normals):
+        sizes.append(len(points))
+        return _arriving(scene, emitter, points, normals)
+
+    monkeypatch.setattr(exchange_module, "_arriving", counted)
+    monkeypatch.setattr(exchange_module, "_AT_ONCE", 100)
+    assert np.array_equal(light.gathered(met, 70, 64), whole)
+    assert whole.any()
+    assert max(sizes) <= 100 < sum(sizes)
+
+
 def test_what_rays_gather():
     """Of what they meet the light that falls there and what its patch has, by its reflectance; of two lights each by
     every second ray, doubled.
