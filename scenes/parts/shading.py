@@ -141,9 +141,12 @@ def _weights(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _within(solid: Solid, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Of facets (n,) at points (n, 3): between the corners of that triangle of each in which the point lies."""
     order, first, many = _triangles_of(solid)
-    inside, triangle, share = np.full(len(faces), -np.inf), np.zeros(len(faces), int), np.zeros((3, len(faces)))
-    count = many[faces]
-    for k in range(count.max()):
+    count, triangle = many[faces], order.take(first[faces], mode="clip")
+    share = _shares(solid, triangle, points)
+    inside = share.min(0)
+    none = ~(inside > -np.inf) | (count == 0)  # of no area, or without a triangle
+    inside[none], share[:, none] = -np.inf, 0.0
+    for k in range(1, count.max()):
         some = np.flatnonzero((count > k) & (inside < 0))
         which = order[first[faces[some]] + k]
         shares = _shares(solid, which, points.take(some, 0))
@@ -153,8 +156,10 @@ def _within(solid: Solid, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
         inside[some], triangle[some], share[:, some] = least[better], which[better], shares[:, better]
     corners, share = corner_normals(solid).take(triangle, 0), np.maximum(share, 0)[..., None]
     found = sum(share[k] * corners[:, k] for k in range(3))
-    size = length(found)[:, None]
-    return np.where(size > 0, found / np.where(size > 0, size, 1.0), solid.normals.take(faces, 0))
+    size = length(found)
+    flat = np.flatnonzero(~(size > 0))
+    found[flat], size[flat] = solid.normals.take(faces[flat], 0), 1.0
+    return found / size[:, None]
 
 
 @lru_cache(maxsize=8)
