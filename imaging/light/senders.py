@@ -20,6 +20,8 @@ from scenes.parts.shading import normals_at
 
 _OF_WAY = 0.7  # of the way to what it sees nearest: the side of a piece
 _LOOKS = 4  # rays that look for it from the middle of a piece and from each corner
+_PLACES = 4  # those
+_AT_ONCE = 1 << 14  # pieces that look
 _FINER, _FINEST = 4.0, 16.0  # times smaller than cells pieces are at most, and beside what is measured
 _OF_DISTANCE = 0.5  # of that from what is measured: so small pieces may be there
 _WITHIN = 0.02  # of the way from a corner to the middle
@@ -114,10 +116,13 @@ def _nearest(exchange: Exchange, triangles: np.ndarray, faces: np.ndarray) -> np
     They look from their corners, too: from its middle one whose side lies at the foot of a narrow step rarely sees it.
     """
     found, some = np.full(len(triangles), np.inf), np.flatnonzero(exchange.has[faces])
-    points = _looking(triangles[some])
-    looking, points = np.repeat(some, points.shape[1]), points.reshape(-1, 3)
-    met = exchange.met(points, exchange.solid.normals[faces[looking]], _LOOKS, shifts(len(points)))
-    np.minimum.at(found, looking[met.starts], np.linalg.norm(met.points - points[met.starts], axis=1))
+    shifted = shifts(_PLACES * len(some)).reshape(-1, _PLACES, 2)
+    for at in range(0, len(some), _AT_ONCE):  # in blocks, which bounds the memory
+        here = some[at : at + _AT_ONCE]
+        points, normals = _looking(triangles[here]).reshape(-1, 3), exchange.solid.normals[faces[here]]
+        met = exchange.met(points, normals.repeat(_PLACES, 0), _LOOKS, shifted[at : at + _AT_ONCE].reshape(-1, 2))
+        away = np.linalg.norm(met.points - points[met.starts], axis=1)
+        np.minimum.at(found, here.repeat(_PLACES)[met.starts], away)
     return found
 
 
