@@ -13,7 +13,7 @@ from imaging.light.emitters import emitters, plain
 from imaging.light.exchange import Exchange, exchanged
 from imaging.light.places import shifts
 from imaging.pictures import Pictures
-from scenes import Picture
+from scenes import Picture, Solid
 from scenes.lights import GLANCE
 from scenes.parts.rows import different
 from scenes.parts.shading import normals_at
@@ -21,7 +21,7 @@ from scenes.parts.shading import normals_at
 _OF_WAY = 0.7  # of the way to what it sees nearest: the side of a piece
 _LOOKS = 4  # rays that look for it from the middle of a piece and from each corner
 _PLACES = 4  # those
-_AT_ONCE = 1 << 14  # pieces that look
+_AT_ONCE = 1 << 14  # pieces
 _FINER, _FINEST = 4.0, 16.0  # times smaller than cells pieces are at most, and beside what is measured
 _OF_DISTANCE = 0.5  # of that from what is measured: so small pieces may be there
 _WITHIN = 0.02  # of the way from a corner to the middle
@@ -60,7 +60,7 @@ def senders(picture: Picture) -> Senders | None:
         return None
     exchange = light.exchange
     triangles, faces = _pieces(exchange, measured_pieces(scene))
-    normals = np.broadcast_to(normals_at(exchange.solid, faces[:, None], triangles), triangles.shape)
+    normals = _normals(exchange.solid, triangles, faces)
     points, owners, which = _places(triangles, normals, faces, scene.surfaces.kinds, exchange.cell)
     return Senders(triangles, normals, faces, scene.camera.exposure * light.sent_at(points, owners)[which])
 
@@ -126,6 +126,15 @@ def _nearest(exchange: Exchange, triangles: np.ndarray, faces: np.ndarray) -> np
     return found
 
 
+def _normals(solid: Solid, triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Of the surfaces in the corners of triangles (n, 3, 3) of faces (n,), as the triangles."""
+    found = np.empty(triangles.shape)
+    for at in range(0, len(faces), _AT_ONCE):  # in blocks, which bounds the memory
+        part = slice(at, at + _AT_ONCE)
+        found[part] = normals_at(solid, faces[part, None], triangles[part])
+    return found
+
+
 def _looking(triangles: np.ndarray) -> np.ndarray:
     """Places of triangles (n, 3, 3) that look at others: beside their corners, and their middles, (n, 4, 3)."""
     return np.concatenate([_inner(triangles), triangles.mean(1, keepdims=True)], 1)
@@ -146,7 +155,8 @@ def _places(
     """
     owners = np.repeat(faces, 3)
     same = np.column_stack([triangles.reshape(-1, 3) / cell, normals.reshape(-1, 3), np.append(kinds, -1.0)[owners]])
-    rows, which = different(np.rint(same / _SAME))
+    same /= _SAME
+    rows, which = different(np.rint(same, out=same))
     inner = _inner(triangles).reshape(-1, 3)
     points = np.column_stack([np.bincount(which, axis) for axis in inner.T]) / np.bincount(which)[:, None]
     some = np.zeros(len(rows), int)
