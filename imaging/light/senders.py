@@ -19,9 +19,8 @@ from scenes.parts.rows import different
 from scenes.parts.shading import normals_at
 
 _OF_WAY = 0.7  # of the way to what it sees nearest: the side of a piece
-_LOOKS = 4  # rays that look for it from the middle of a piece and from each corner
-_PLACES = 4  # those
-_AT_ONCE = 1 << 14  # pieces
+_PLACES, _LOOKS = 4, 4  # from which a piece looks for it, its corners and its middle, and rays from each
+_AT_ONCE = 1 << 14  # pieces whose rays, or normals, are asked for together
 _FINER, _FINEST = 4.0, 16.0  # times smaller than cells pieces are at most, and beside what is measured
 _OF_DISTANCE = 0.5  # of that from what is measured: so small pieces may be there
 _WITHIN = 0.02  # of the way from a corner to the middle

@@ -60,8 +60,8 @@ def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simul
 
     Where two edges run together noise may decide which of them an edge point is on by one rule, and not by another:
     that a simulated picture tells, without an image. And a bias that is not known well enough for one may be for
-    another, which is less precise (`measure.other_estimators`): in images up to a megapixel, where that takes less
-    time than looking for what else would tell of it. What ``made`` makes is a correction by one method.
+    another (`measure.other_estimators`): asked in images up to a megapixel alone, for each simulates all anew. What
+    ``made`` makes is a correction by one method.
     """
     found = made(picture, Method(measure.best_estimator(picture)))
     for name in measure.other_estimators(picture.scene):
