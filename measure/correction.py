@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import reduce
 
 import numpy as np
+from scipy import sparse
 
 from imaging.bundles.biases import FeatureBias
 from imaging.colour import seen
@@ -26,7 +27,7 @@ from measure.propagation import PropagatedValues, propagate
 from measure.quantities import MeasuredFeatures, find
 from measure.render_noise import by_features, by_pixels
 from measure.saturation import limits
-from scenes import InvalidInput, Picture, status
+from scenes import InvalidInput, Noise, Picture, status
 from scenes.status import MEASURED
 
 Pair = tuple[np.ndarray, np.ndarray]
@@ -40,8 +41,9 @@ class Images:
     ----------
     renders : tuple of ndarray
         Of independent rays; the biases are the mean of theirs.
-    changed : dict of str to tuple of ndarray
-        By source: the first render with one input each changed by one standard uncertainty.
+    changed : dict of str to csr_array, shape (k, height * width)
+        By source: by how much the first render's pixels change, row by row, with one input each changed by one standard
+        uncertainty.
     beside : tuple of ndarray
         Renders of other rays that say how large the renderer's noise is, and nothing of the bias.
     known : dict of str to pair of ndarray, shape (M,)
@@ -56,7 +58,7 @@ class Images:
     """
 
     renders: tuple[np.ndarray, ...]
-    changed: Mapping[str, tuple[np.ndarray, ...]] = field(default_factory=dict)
+    changed: Mapping[str, sparse.csr_array] = field(default_factory=dict)
     beside: tuple[np.ndarray, ...] = ()
     known: Mapping[str, Pair] = field(default_factory=dict)
     of_features: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -94,8 +96,7 @@ def correction(
         raise InvalidInput("light must be a pose to correct the bias, got nothing")
     clean = mean_of(images.renders)  # noise of rays makes weak edges steeper where they cross zero, sigma less
     told = propagated or propagate(clean, picture, estimator=estimator, threshold=threshold).measurands
-    steps = [(name, image) for name, some in images.changed.items() for image in some]
-    levels = _levels((*images.renders, *images.beside, *(image for _, image in steps), clean), picture)
+    levels = _levels(images, clean, picture)
     *values, found = _measured(levels, picture, estimator, threshold)
     renders, alike = len(images.renders), len(images.renders) + len(images.beside)
     known = measurands(Pictures.of(picture))
@@ -104,7 +105,8 @@ def correction(
         for each, true in zip(values, (known.value_object, known.value), strict=True)
     )
     noise = _noise(images, picture, told, levels[:alike], found, tuple(each[:alike] for each in values))
-    names, moved = tuple(name for name, _ in steps), [each[alike:-1] - each[0] for each in values]
+    names = tuple(name for name, some in images.changed.items() for _ in range(some.shape[0]))
+    moved = [each[alike:-1] - each[0] for each in values]
     adjusted = _adjusted(images, picture, names, moved)
     object_, image = (
         {
@@ -174,14 +176,29 @@ def mean_of(renders: Sequence[np.ndarray]) -> np.ndarray:
     return reduce(np.add, renders) / len(renders)
 
 
-def _levels(images: Sequence[np.ndarray], picture: Picture) -> np.ndarray:
-    """What the sensor records of noise-free images, (n, height, width)."""
-    camera = picture.scene.camera
-    size = camera.height, camera.width
-    levels = np.empty((len(images), *size))
-    for level, image in zip(levels, images, strict=True):
-        level[:] = seen(picture.scene.noise, checked_image(image, size)).level
+def _levels(images: Images, clean: np.ndarray, picture: Picture) -> np.ndarray:
+    """What the sensor records, (n, height, width): of renders, of others, of the first one changed by each input, and
+    of the renders' mean."""
+    noise, size = picture.scene.noise, (picture.scene.camera.height, picture.scene.camera.width)
+    alike = *images.renders, *images.beside
+    changes = [some[[k]] for some in images.changed.values() for k in range(some.shape[0])]
+    levels = np.empty((len(alike) + len(changes) + 1, *size))
+    for level, image in zip(levels, alike, strict=False):
+        level[:] = seen(noise, checked_image(image, size)).level
+    for level, change in zip(levels[len(alike) :], changes, strict=False):
+        _change(level, images.renders[0], levels[0], change, noise)
+    levels[-1] = seen(noise, clean).level
     return levels
+
+
+def _change(level: np.ndarray, first: np.ndarray, recorded: np.ndarray, change: sparse.csr_array, noise: Noise) -> None:
+    """Write what is recorded of a changed image into ``level``; without filters pixels are by themselves."""
+    some = change.indices
+    changed = first.ravel()[some] + change.data
+    level[:] = recorded if noise.colour is None else first
+    level.ravel()[some] = seen(noise, changed).level if noise.colour is None else changed
+    if noise.colour is not None:
+        level[:] = seen(noise, level).level
 
 
 def _measured(

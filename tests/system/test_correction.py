@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import measure
 import planner
@@ -95,7 +96,8 @@ def test_each_source_counts_by_what_it_moves(small_task1, crowded):
         sensor = Pose(picture.sensor.polar_deg + polar, picture.sensor.azimuth_deg)
         moved.append(block_image(small_task1, sensor, picture.lights[0]))
     values = [measure.measure(image, picture, estimator="gradient").value[0] for image in (exact, *moved)]
-    off = measure.correction(Images((exact, renders[1]), {"pose": tuple(moved)}), picture)
+    changed = sparse.csr_array(np.reshape(moved, (2, -1)) - exact.ravel())
+    off = measure.correction(Images((exact, renders[1]), {"pose": changed}), picture)
     expected = np.sqrt((values[1] - values[0]) ** 2 + (values[2] - values[0]) ** 2)
     assert off.sources["pose"] == pytest.approx(expected, rel=1e-6)
     assert off.u_bias[0] ** 2 == pytest.approx(expected**2 + off.sources["rendering"][0] ** 2)

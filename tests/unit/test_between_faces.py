@@ -119,7 +119,7 @@ def test_one_surface_reflects_less_by_what_its_light_has_met(picture, monkeypatc
         return np.full(len(points), 8.0), np.full(len(points), 0.7 * 8.0)
 
     monkeypatch.setattr("validation.simulation.dimmed.light_of_dimmed", told)
-    found = of_one_surface(picture, (render,), lambda: direct, 0.1)
+    found = render + of_one_surface(picture, (render,), lambda: direct, 0.1).toarray().reshape(render.shape)
     assert found[~inner] == pytest.approx(render[~inner] - 5.0)
     assert found[near] == pytest.approx(render[near] - 5.0 - 0.3 * 8.0, abs=1e-6)
     assert asked == [near.sum()]

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 import measure
 import planner
@@ -28,6 +29,12 @@ from validation.simulation import images as imagery
 
 POSES = (30, 90), (15, 270)
 ROUGH = Images((np.zeros((2, 2)),))
+
+
+def changed(images, source):
+    """The first render, changed by each input of a source."""
+    first = images.renders[0]
+    return first + images.changed[source].toarray().reshape(-1, *first.shape)
 
 
 @pytest.fixture(scope="module")
@@ -313,7 +320,7 @@ def test_lights_elsewhere_are_drawn_where_the_image_model_draws_the_render(small
     images = imagery.completed(picture, (first,), (), How().by(Method("arrangement")))
     assert len(shown) == rendered
     others = [planner.image(each) - here for each in inputs.with_lights_moved(picture, math.sqrt(3.0))]
-    for made, other in zip(images.changed["light_place"][::2], others, strict=True):
+    for made, other in zip(changed(images, "light_place")[::2], others, strict=True):
         assert np.abs(other).max() > 0.1
         assert made - first == pytest.approx(other / math.sqrt(3.0), abs=0.1 * np.abs(other).max())  # of first order
 
@@ -510,23 +517,25 @@ def test_what_is_compared_is_rendered_once(monkeypatch, below):
         return np.full((2, 2), 50.0 + len(asked))
 
     monkeypatch.setattr(How, "_rendered", rendered)
-    monkeypatch.setattr(imagery, "of_one_surface", lambda picture, renders, direct, part: renders[0] - direct())
+    monkeypatch.setattr(
+        imagery, "of_one_surface", lambda picture, renders, direct, part: csr_array(-direct().reshape(1, -1))
+    )
     monkeypatch.setattr(imagery, "LARGE", 1 << 20 if below else 1)
     picture = Picture.of(scene, scene.settings[0].sensor, scene.settings[0].light)
     images = imagery.completed(picture, (np.full((2, 2), 77.0),), (), How())
     assert [each[1:] for each in asked] == [(True, below)] * (7 + 2 * below)
     assert [shown is picture for shown, *_ in asked].count(True) == 1
     assert len({shown for shown, *_ in asked}) == 7 + 2 * below
-    dark, here, first = scene.noise.dark_level, 53 if below else 51, 54 if below else 52
+    dark, here, first = scene.noise.dark_level, 52 if below else 51, 54 if below else 52
 
     def told(one, other, times):
         one, other = (dark + (77 - dark) * (level - dark) / (here - dark) for level in (one, other))
         return [77 + (one - other) / (2 * times), 77 + (one + other - 2 * 77) / (2 * times)]
 
-    reflected = told(51, 52, 1.0) if below else [77 - 51]
+    reflected = told(51, 53, 1.0) if below else [77 - 51]
     lit = [value for k in range(first, first + 6, 2) for value in told(k, k + 1, math.sqrt(3.0))]
-    assert [each.flat[0] for each in images.changed["reflectance"]] == pytest.approx(reflected, rel=1e-12)
-    assert [each.flat[0] for each in images.changed["light_place"]] == pytest.approx(lit, rel=1e-12)
+    assert [each.flat[0] for each in changed(images, "reflectance")] == pytest.approx(reflected, rel=1e-12)
+    assert [each.flat[0] for each in changed(images, "light_place")] == pytest.approx(lit, rel=1e-12)
 
 
 @pytest.mark.parametrize("overall", [False, True])
@@ -541,10 +550,10 @@ def test_a_shadow_that_reaches_an_edge_from_where_a_light_may_stand_counts(monke
 
     monkeypatch.setattr(How, "_rendered", rendered)
     images = imagery.completed(picture, (How().image(picture),), (), How())
-    here, straight, bent = images.renders[0], *images.changed["light_place"][:2]
+    here, straight, bent = images.renders[0], *changed(images, "light_place")[:2]
     if overall:
         of_all = imagery.of_all(picture, images, How())[0]
-        at = 2 + len(images.changed["reflectance"])
+        at = 2 + images.changed["reflectance"].shape[0]
         here, straight, bent = of_all[1], *of_all[at : at + 2]
     shadow = 100.0 / (2 * math.sqrt(3.0))
     assert (here - straight)[0, 1] == pytest.approx(shadow, rel=0.01)  # the rest is scaled to the same sum of squares
@@ -566,7 +575,7 @@ def test_a_reflectance_does_what_it_does_on_both_sides(monkeypatch, overall):
 
     monkeypatch.setattr(How, "_rendered", rendered)
     images = imagery.completed(picture, (How().image(picture),), (), How())
-    beside = *images.renders, *images.changed["reflectance"]
+    beside = *images.renders, *changed(images, "reflectance")
     here, straight, bent = imagery.of_all(picture, images, How())[0, 1:4] if overall else beside
     u = scene.uncertainty.reflectance.u
     by_part = (here - straight)[0] / (100.0 * u)
@@ -595,10 +604,12 @@ def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
     images = imagery.completed(picture, (np.full((2, 2), dark + 100.0),), (), how)
     settled = imagery.settled(picture, images, how)
     assert sorted(seeds) == sorted(9 * [7, 8, 9, 10])
-    assert {name: len(some) for name, some in settled.changed.items()} == {"reflectance": 2, "light_place": 6}
-    for name, some in settled.changed.items():
+    assert {name: some.shape[0] for name, some in settled.changed.items()} == {"reflectance": 2, "light_place": 6}
+    for name in settled.changed:
         far = 1.0 if name == "reflectance" else math.sqrt(3.0)
-        for settled_one, first_one in zip(some[::2], images.changed[name][::2], strict=True):  # others: what is bent
+        for settled_one, first_one in zip(  # others: what is bent
+            changed(settled, name)[::2], changed(images, name)[::2], strict=True
+        ):
             assert first_one == pytest.approx(np.full((2, 2), dark + 100.0 + 2.0 / far), rel=1e-12)
             mean = 1 + (0 + 1 + 4 + 9) / 4
             assert settled_one == pytest.approx(np.full((2, 2), dark + 100.0 + 2.0 * mean / far), rel=1e-12)
@@ -652,7 +663,11 @@ def test_what_is_compared_has_finer_pixels_up_to_a_megapixel(picture, below, fin
 def test_what_few_rays_tell_of_all_levels_moves_no_edge():
     """An edge that few rays show aside: of a picture that is a tenth darker the image is, too; a spot of 5 is one."""
     first, here = np.array([[100.0, 100.0, 20.0, 20.0]]), np.array([[100.0, 70.0, 20.0, 20.0]])
-    assert imagery._changed(first, here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
+
+    def after(here, other):
+        return first + imagery._moved(first, lambda: here, other, 0.0).toarray()
+
+    assert after(here, 0.9 * here) == pytest.approx(0.9 * first, rel=1e-12)
     with_spot = first + np.array([[0.0, 0.0, 0.0, 5.0]])
-    assert imagery._changed(first, first, with_spot) == pytest.approx(with_spot, rel=1e-12)
-    assert imagery._changed(first, 0 * here, 0 * here).tolist() == [[0.0] * 4]
+    assert after(first, with_spot) == pytest.approx(with_spot, rel=1e-12)
+    assert after(0 * here, 0 * here).tolist() == [[0.0] * 4]

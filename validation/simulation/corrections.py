@@ -27,7 +27,7 @@ from scenes import Picture, Scene
 from scenes.status import CLUTTER, ILL_CONDITIONED, MISFIT, OK, is_trusted
 from validation.remeasured import Method
 from validation.simulation.how import How, is_below
-from validation.simulation.images import completed, of_all, rebased, settled
+from validation.simulation.images import completed, of_all, settled
 
 _PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
 _ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
@@ -133,7 +133,7 @@ def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction
         if _noise(found) <= 1:
             return sure(picture, found, of, more_telling(picture, images, how)), told
     renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
-    images = rebased(images, renders) if images else completed(picture, renders, (), how)
+    images = replace(images, renders=renders) if images else completed(picture, renders, (), how)
     told = propagated(renders)
     of = partial(told_by, picture, method, told)
     found, images = _quieter(picture, of, of(images), images, how)

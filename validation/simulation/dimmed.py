@@ -1,4 +1,4 @@
-"""A render of a part all of whose surfaces, of one material, reflect less than those of another render.
+"""What a render changes by of a part all of whose surfaces, of one material, reflect less.
 
 Direct light is less by the same part everywhere, which moves no edge. Light that has met more surfaces is less by more:
 how much, closed form tells place by place, of how much of it there is in the render. So nothing is rendered anew, and
@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy import sparse
 from scipy.ndimage import gaussian_filter, maximum_filter
 
 from imaging.features.locator import edge_blur
@@ -31,8 +32,8 @@ _NEIGHBOURS, _RARELY = 1.5, 1e-6  # px, standard deviation: pixels that show no 
 
 def of_one_surface(
     picture: Picture, renders: Sequence[np.ndarray], direct: Callable[[], np.ndarray], part: float
-) -> np.ndarray | None:
-    """The first render with every surface reflecting less by a part, near what is measured.
+) -> sparse.csr_array | None:
+    """By how much pixels of the first render change where every surface reflects less by a part, near what is measured.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def of_one_surface(
 
     Returns
     -------
-    ndarray, shape (height, width), or None
+    csr_array, shape (1, height * width), or None
         None where surfaces are of several materials or closed form does not tell.
     """
     scene = picture.scene
@@ -65,7 +66,8 @@ def of_one_surface(
     left = np.clip((after + once * least) / (before + least), (1 - part) ** 8, once)
     less = (1 - part - once) * between
     less[box] = (1 - part - left) * between[box]
-    return (1 - part) * renders[0] + part * scene.noise.dark_level - less
+    less += part * (renders[0] - scene.noise.dark_level)
+    return sparse.csr_array(-less.reshape(1, -1))
 
 
 def _asked(picture: Picture, shape: tuple[int, int]) -> np.ndarray:

@@ -20,6 +20,7 @@ from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
+from scipy import sparse
 
 from imaging.blurred.whole import image as drawn
 from imaging.blurred.whole import is_drawable
@@ -63,7 +64,7 @@ def completed(
     if active & MANY_WAYS == {BETWEEN} and not is_below(picture, LARGE):
         dimmed = of_one_surface(picture, renders, partial(direct, picture), u_of(picture.scene.uncertainty.reflectance))
     if dimmed is not None:
-        changed = {REFLECTANCE: (dimmed,)}
+        changed = {REFLECTANCE: dimmed}
     elif is_below(picture, LARGE):
         changed = {REFLECTANCE: _both_ways(first, whole, of_other_surfaces, picture)}
     else:
@@ -79,7 +80,7 @@ def completed(
         made = drawing if _is_drawn(picture, first, drawing) else rendered
         changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
     modelled.forget()
-    changed = {name: some for name, some in changed.items() if some}
+    changed = {name: some for name, some in changed.items() if some.shape[0]}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
 
 
@@ -115,19 +116,7 @@ def settled(picture: Picture, images: Images, how: How) -> Images:
     """
     seeded = (replace(how, quality=replace(how.quality, seed=how.quality.seed + k)) for k in range(1, _SETS))
     sets = [images.changed, *(completed(picture, images.renders, images.beside, each).changed for each in seeded)]
-    changed = {
-        name: tuple(np.mean(same, axis=0) for same in zip(*(each[name] for each in sets), strict=True))
-        for name in images.changed
-    }
-    return replace(images, changed=changed)
-
-
-def rebased(images: Images, renders: tuple[np.ndarray, ...]) -> Images:
-    """With other renders; what is changed differs from the first of them by as much as before."""
-    moved = {
-        name: tuple(renders[0] + (each - images.renders[0]) for each in some) for name, some in images.changed.items()
-    }
-    return replace(images, renders=renders, changed=moved)
+    return replace(images, changed={name: sum(each[name] for each in sets) / len(sets) for name in images.changed})
 
 
 def _pairs(others: Callable[[Picture, float], Iterable[Picture]], picture: Picture, times: float = 1.0) -> Iterable:
@@ -141,48 +130,34 @@ def _both_ways(
     others: Callable[[Picture, float], Iterable[Picture]],
     picture: Picture,
     times: float = 1.0,
-) -> tuple[np.ndarray, ...]:
-    """For each input the first render with what it does on the straight line, and with what both ways lie off it."""
-    ways = [each for pair in _pairs(others, picture, times) for each in pair]
-    found = iter(_steps(first, made, ways, picture))
-    return tuple(
-        _added(first, part, 2 * times)
-        for one, other in zip(found, found, strict=True)
-        for part in (one - other, one + other - 2 * first)
-    )
-
-
-def _added(first: np.ndarray, part: np.ndarray, over: float) -> np.ndarray:
-    """The first render and a difference over a number, in the memory of the latter."""
-    part /= over
-    part += first
-    return part
+) -> sparse.csr_array:
+    """For each input what it does to the first render on the straight line, and what both ways lie off it, (2 k, N)."""
+    moved = _steps(first, made, [each for pair in _pairs(others, picture, times) for each in pair], picture)
+    one, other = moved[::2], moved[1::2]
+    order = np.arange(moved.shape[0]).reshape(2, -1).T.ravel()
+    return (sparse.vstack([one - other, one + other], format="csr") / (2 * times))[order]
 
 
 def _steps(
-    first: np.ndarray,
-    made: Callable[[Picture], np.ndarray],
-    others: Iterable[Picture],
-    picture: Picture,
-) -> tuple[np.ndarray, ...]:
-    """The first render with what other pictures differ by from this one, both of the same random numbers."""
-    changed, dark = [made(other) for other in others], picture.scene.noise.dark_level
-    here = made(picture) if changed else first
-    return tuple(_changed(first, here, other, dark) for other in changed)
+    first: np.ndarray, made: Callable[[Picture], np.ndarray], others: Iterable[Picture], picture: Picture
+) -> sparse.csr_array:
+    """By how much other pictures differ from this one, all of the same random numbers, (k, N), in the first render.
 
-
-def _changed(first: np.ndarray, here: np.ndarray, other: np.ndarray, dark: float = 0.0) -> np.ndarray:
-    """An image as another one differs from this one, ``here``, both of few rays; grey levels.
-
-    Of the same picture with many rays, ``first``. Edges lie a little elsewhere in an image of few rays: what it says
-    of all levels together is taken of the other image itself, or a light that is farther away would move them. Most of
-    a large image is dark where nothing is measured, and so are both: only the rest of them is read.
+    Most of a large image is dark where nothing is measured, and only the rest of it is read.
     """
-    lit = np.flatnonzero((here != dark) | (other != dark))
-    before, after = (image.ravel()[lit] - dark for image in (here, other))
+    dark, here = picture.scene.noise.dark_level, cache(partial(made, picture))
+    rows = [_moved(first, here, made(other), dark) for other in others]
+    return sparse.vstack([*rows, sparse.csr_array((0, first.size))], format="csr")
+
+
+def _moved(first: np.ndarray, here: Callable[[], np.ndarray], other: np.ndarray, dark: float) -> sparse.csr_array:
+    """By how much an image differs from that of the picture itself, ``here``, both of few rays, (1, N); grey levels.
+
+    In the render of many rays, ``first``. Edges lie a little elsewhere in an image of few rays: what it says of all
+    levels together is taken of the other image itself, or a light that is farther away would move them.
+    """
+    lit = np.flatnonzero((first != dark) | (here() != dark) | (other != dark))
+    levels, before, after = (image.ravel()[lit] - dark for image in (first, here(), other))
     part = float(after @ before) / max(float(before @ before), np.finfo(float).tiny)
-    changed = first - dark
-    changed *= part
-    changed += dark
-    changed.ravel()[lit] += after - part * before
-    return changed
+    change = (part - 1) * levels + (after - part * before)
+    return sparse.csr_array((change, lit, [0, lit.size]), (1, first.size))
