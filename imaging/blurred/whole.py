@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,7 +63,8 @@ def signal_at(pictures: Pictures, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     arrangement = arrangement_of(pictures)
     if not len(arrangement.pieces):  # no light falls on what is seen
         return np.zeros(x.size)
-    model = BlurredModel(arrangement, x, y, _NONE)
+    known = tuple(replace(region, order=0) for region in arrangement.regions)  # as the light gives it, and no other
+    model = BlurredModel(replace(arrangement, regions=known), x, y, _NONE)
     return model.image(model.start())
 
 
