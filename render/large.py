@@ -119,17 +119,18 @@ def fine_pixels(
         return direct + fine_of(_bounced(renders.bounced, near, moving, few), k)
     if renders.everywhere:
         first = renders.whole(False, ordinary)
-        divided, asked = fine_of(crossed(first, math.ceil(reach / k)) | near, k), None
+        fine, divided, asked = fine_of(first, k), fine_of(crossed(first, math.ceil(reach / k)) | near, k), None
     else:
-        first = np.zeros(near.shape)
+        first, fine = np.zeros(near.shape), np.zeros([k * size for size in near.shape], np.float32)
         divided, asked = fine_of(near, k), fine_of(~dilated(~near, 3), k)  # beside what is dark there is a step
-    fine = renders.again(False, fine_of(first, k), divided, ordinary)
-    marked, close, lent = crossed(fine, reach, where=asked) & divided, fine_of(near, k), True
+    fine = renders.again(False, fine, divided, ordinary)
+    marked, close, lent = crossed(fine, reach, where=asked), fine_of(near, k) if renders.everywhere else divided, None
+    marked &= divided
     if renders.random and renders.even is not None:
         seen = renders.even.lent_to(np.ones_like(near) if renders.everywhere else near)
         lent = fine_of(seen, k)
     if renders.random and renders.alike and not renders.everywhere:
-        return renders.again(True, fine, close & lent, max(few, many))
+        return renders.again(True, fine, close if lent is None else close & lent, max(few, many))
     if renders.random and renders.even is not None:
         moving = near if close_by > few else near_required(picture, crop, k, _MOVING)
         fine = with_light_between(renders, renders.even, first, fine, Zones(seen, near, moving), marked, counts)
@@ -139,13 +140,19 @@ def fine_pixels(
         if is_large(crop, k, random=True):  # else few rays at all would tell the variances badly
             moving = fine_of(near_required(picture, crop, k, _MOVING), k)
         fine = _with_random(renders, fine, plain & moving, plain & ~np.asarray(moving), close_by)
-    for where, count in ((marked & ~close, min(many, _BESIDE)), (marked & close, many)):
-        for random in sorted({False, renders.random}):
-            some = where & lent if random else where & ~np.asarray(lent & renders.random)
+    parts = [(marked & ~close, min(many, _BESIDE)), (marked & close, many)] if renders.everywhere else [(marked, many)]
+    for where, count in parts:
+        for random, some in _by_light(where, lent) if renders.random else [(False, where)]:
             fine = renders.again(random, fine, some, count) if some.any() else fine
-    beside = close & ~marked & dilated(marked, 3)  # elsewhere it is noise
-    missed = crossed(fine, step=MISSED, where=beside)
+    beside = dilated(marked, 3)  # elsewhere it is noise
+    beside &= close
+    missed = crossed(fine, step=MISSED, where=np.greater(beside, marked, out=beside))
     return renders.again(renders.random, fine, missed, many) if missed.any() else fine
+
+
+def _by_light(where: np.ndarray, lent: np.ndarray | None) -> list[tuple[bool, np.ndarray]]:
+    """Whether light takes random ways to some pixels, and which these are: to all where ``lent`` does not tell."""
+    return [(True, where)] if lent is None else [(False, where & ~lent), (True, where & lent)]
 
 
 def _bounced(
