@@ -1,7 +1,7 @@
 """Light that met two other surfaces at least before the one that is seen, gathered from patches of the first of them.
 
 Most of the noise of light between faces is that of light which met more than one, and little of the light: a ray finds
-by chance what has been sent on again. Patches (`imaging.light.exchange`) tell it without noise.
+by chance what has been sent on again. Patches (`imaging.light.exchanged`) tell it without noise.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 
 from imaging.light.bore import Bore, alone, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters, plain
-from imaging.light.exchange import Exchanged, exchanged, once_reflected
+from imaging.light.exchanged import Exchanged, exchanged, once_reflected
 from imaging.light.illumination import dimming_of_one
 from imaging.light.irradiance import beam
 from imaging.pictures import Pictures

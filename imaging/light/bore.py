@@ -15,7 +15,8 @@ import numpy as np
 
 from imaging.geometry.rays import first_face
 from imaging.light.emitters import Emitter
-from imaging.light.exchange import Exchange, Exchanged, Hits
+from imaging.light.exchange import Exchange, Hits
+from imaging.light.exchanged import Exchanged
 from imaging.light.irradiance import beam
 from imaging.light.places import in_unit_square, shifts, ways_about
 from scenes import Circle, Floor, Scene, Solid

@@ -1,13 +1,10 @@
-"""Light that faces send to each other, by radiosity: of an inner edge, a step, a pocket, an obstacle, the floor.
+"""What faces see of each other, by rays: of an inner edge, a step, a pocket, an obstacle, the floor.
 
-Faces on the convex hull of all bodies see no other, but the floor where they do not look up. What walls of round
-through holes have from themselves has a closed form (`imaging.light.bore`), but others see them as they see all faces.
-All that see others, however many, have places spread evenly over them, each of which stands for a patch: what is nearer
-to it than to others and looks the same way, so that facets of a fillet share one. Where light is told roughly, a patch
-is that of many places. Rays tell once for a solid which share of what a patch sees is each other one, and where they
-end the lights' own light is asked for; the patches exchange light by it. What arrives on a face is gathered when it is
-asked for, by rays from nodes of it: what they meet sends its share of the light that falls there, and of what its patch
-has from the others.
+Faces on the convex hull of all bodies see no other, but the floor where they do not look up. All that see others,
+however many, have places spread evenly over them, each of which stands for a patch: what is nearer to it than to others
+and looks the same way, so that facets of a fillet share one. Where light is told roughly, a patch is that of many
+places. Rays tell once for a solid which share of what a patch sees is each other one. On a face that is asked for nodes
+see others by more rays. Which light goes that way: `imaging.light.exchanged`.
 
 Rays follow Lambert's cosine and a low-discrepancy sequence: a share is off by about their number to the power -0.75,
 and all shares of a place add to 1.
@@ -23,19 +20,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from imaging.geometry.rays import first_face
-from imaging.light.annulus import Annulus, about, measured_rims
-from imaging.light.emitters import Emitter
-from imaging.light.irradiance import beam
+from imaging.light.annulus import Annulus, about
 from imaging.light.kept import kept
 from imaging.light.nodes import Frame, along, frame_of, goes_on, onto
-from imaging.light.places import Places, areas_of, in_unit_square, middles_of, shift_of, shifts, ways_about
+from imaging.light.places import Places, areas_of, in_unit_square, shift_of, shifts, ways_about
 from imaging.light.walls import Wall, wall
-from scenes import Circle, Floor, Scene, Solid
+from scenes import Circle, Floor, Solid
 from scenes.parts.shading import normals_at
 from scenes.parts.solid import assembled
 
 if TYPE_CHECKING:
-    from scipy.interpolate import RectBivariateSpline
     from scipy.sparse import csr_matrix
     from scipy.spatial import KDTree
 
@@ -45,22 +39,17 @@ _PLACES, _RAYS = 15, 32  # of a cell, about, and from each of them; an odd numbe
 _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is narrower than a cell
 _FROM_RIM = 4096  # of a node beside a measured rim
 _FROM_WALL = 1024  # of a curved surface all of whose facets are told together
-_FROM_PIECE = 32  # of a place that sends light on
-_BOUNCES, _LEFT = 200, 1e-9  # at most, and part of the light that is left after the last one
 _ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly, by patches of a cell
-_ROUGH_PATCHES = 4  # about a small face, whose light is then a mean of theirs
-_REFLECTED = 128  # rays of a place that is asked what lit faces it sees
 _NODES = 160  # of the whole body; nodes on a face that is asked for stand so dense
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
 _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; beyond it is like the nearest of them
 _FLOOR_CELLS = 400  # of it, besides those of the bodies
 _UP = 1 - 1e-9  # cosine of a normal that sees no floor
-_AT_ONCE = 200_000  # rays
-_TOGETHER = 16  # faces
+AT_ONCE = 200_000  # rays
 _NUMBER = np.int32  # of what rays meet there are millions, which are kept
-_LIFT = 1e-6  # of the object's size: between a place and its own face
-_MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
+LIFT = 1e-6  # of the object's size: between a place and its own face
+MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
 
 
 class Hits(NamedTuple):
@@ -184,7 +173,7 @@ class Exchange:
 
         Others where the unit square that they stand for is ``shifted`` otherwise, (2,) or (n, 2).
         """
-        size, shifted = max(1, _AT_ONCE // rays), np.broadcast_to(shifted, (len(points), 2))
+        size, shifted = max(1, AT_ONCE // rays), np.broadcast_to(shifted, (len(points), 2))
         parts = []
         for at in range(0, len(points), size):
             part = slice(at, at + size)
@@ -194,8 +183,8 @@ class Exchange:
 
     def _met(self, points: np.ndarray, normals: np.ndarray, square: np.ndarray, but: tuple[int, ...]) -> Hits:
         ways = ways_about(normals, square)
-        starts = np.broadcast_to((points + _LIFT * self.solid.extent * normals)[:, None], ways.shape)
-        face, t = first_face(self.solid, starts, ways, (), margin=_MARGIN)
+        starts = np.broadcast_to((points + LIFT * self.solid.extent * normals)[:, None], ways.shape)
+        face, t = first_face(self.solid, starts, ways, (), margin=MARGIN)
         if self.floor is not None:
             face, t = self._met_or_floor(face, t, starts, ways)
         sends = self.has.copy()
@@ -203,9 +192,13 @@ class Exchange:
         point, ray = np.nonzero(sends[face])  # nothing met, -1, is the last
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
-        coordinates = _placed(places, self.solid.normals[face], self.scale)
-        point, ray, face, patch = (each.astype(_NUMBER) for each in (point, ray, face, self.tree.query(coordinates)[1]))
+        _, patch = self.nearest(places, self.solid.normals[face])
+        point, ray, face, patch = (each.astype(_NUMBER) for each in (point, ray, face, patch))
         return Hits(point, ray, places, face, patch)
+
+    def nearest(self, points: np.ndarray, normals: np.ndarray, count: int = 1) -> tuple[np.ndarray, np.ndarray]:
+        """Of points (n, 3) of unit normals the patches that they belong to, or so many, and how far these are."""
+        return self.tree.query(_placed(points, normals, self.scale), count)
 
     def _met_or_floor(
         self, face: np.ndarray, t: np.ndarray, starts: np.ndarray, ways: np.ndarray
@@ -232,129 +225,6 @@ class Sheet:
     v: np.ndarray
     met: Hits
     rays: int
-
-
-@dataclass(frozen=True, eq=False)
-class Exchanged:
-    """Light that faces have from each other under given lights, irradiance in units of the signal of a white face.
-
-    Attributes
-    ----------
-    scene : Scene
-    emitters : tuple of Emitter
-    exchange : Exchange
-    arriving : ndarray, shape (p,)
-        At the patches, from each other.
-    """
-
-    scene: Scene
-    emitters: tuple[Emitter, ...]
-    exchange: Exchange
-    arriving: np.ndarray
-
-    def at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        """What arrives at points (..., 3) on faces (...)."""
-        found, small = np.zeros(faces.shape), self.exchange.small
-        places = points.reshape(-1, 3)
-        asked = list(self._asked(places, faces.ravel()))
-        for told, (_, here, share) in zip(_told(self, [number for number, *_ in asked]), asked, strict=True):
-            found.reshape(-1)[here] += share * told.at(places.take(here, 0))
-        some = small[faces] & self.exchange.has[faces]
-        if some.any():
-            found[some] = self._by_patches[faces[some]]
-        return found
-
-    def _asked(self, points: np.ndarray, faces: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Which annuli and faces tell the light at points (n, 3) on faces (n,): number, where, how much of it."""
-        exchange, left = self.exchange, np.ones(len(points))
-        for number, annulus in exchange.annuli.items():
-            here = np.flatnonzero(faces == annulus.circle.face)
-            share = np.minimum(annulus.share(points.take(here, 0)), left[here])
-            here, share = here[share > 0], share[share > 0]
-            left[here] -= share
-            if here.size:
-                yield number, here, share
-        for face, here in _by_face(exchange.told_as(faces)):
-            here = here[left[here] > 0]
-            if here.size and face != NOT_TOLD:
-                yield face, here, left[here]
-
-    @cached_property
-    def _by_patches(self) -> np.ndarray:
-        """What arrives in the middles of all faces, (F,): a mean of what does at the patches about them."""
-        solid, exchange = self.exchange.solid, self.exchange
-        middles = middles_of(solid)
-        away, near = exchange.tree.query(_placed(middles, solid.normals, exchange.scale), _ROUGH_PATCHES)
-        weights = np.exp(-2 * (away**2 - away[:, :1] ** 2))
-        return (weights * self.arriving[near]).sum(1) / weights.sum(1)
-
-    def sent_at(self, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        """What points (n, 3) within faces (n,) send on of what arrives there."""
-        exchange, found, some = self.exchange, np.zeros(len(points)), np.flatnonzero(self.exchange.has[faces])
-        shifted, size = shifts(len(some)), _AT_ONCE // _FROM_PIECE  # in blocks, which bounds the memory
-        for at in range(0, len(some), size):
-            here = some[at : at + size]
-            normals = normals_at(exchange.solid, faces[here], points[here])
-            met = exchange.met(points[here], normals, _FROM_PIECE, shifted[at : at + size])
-            found[here] = _white(self.scene, faces[here]) * self.gathered(met, len(here), _FROM_PIECE)
-        return found
-
-    def gathered(self, met: Hits, count: int, rays: int | np.ndarray) -> np.ndarray:
-        """What arrives at ``count`` points from what so many rays, int or (count,), from each of them met.
-
-        Of several emitters each is asked for every so manieth ray.
-        """
-        direct = _direct(self.scene, self.emitters, self.exchange.solid, met)
-        sent = _white(self.scene, met.faces) * (direct + self.arriving[met.patches])
-        return np.bincount(met.starts, sent, count) / rays
-
-
-def _by_face(faces: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Each of the numbers (n,) and where it stands, in rising order."""
-    order = np.argsort(faces, kind="stable")
-    starts = np.flatnonzero(np.append(faces.size > 0, np.diff(faces[order])))
-    for here in np.split(order, starts[1:]):
-        if here.size:
-            yield int(faces[here[0]]), here
-
-
-@dataclass(frozen=True, eq=False)
-class Told:
-    """What arrives on a face, by places in the rectangle about it, or beside a rim."""
-
-    frame: Frame | Annulus | Wall
-    values: RectBivariateSpline
-
-    def at(self, points: np.ndarray) -> np.ndarray:
-        """At points (n, 3) of the face."""
-        return self.values.ev(*self.frame.coordinates(points).T)
-
-
-@kept(most=2048)
-def _told(light: Exchanged, faces: list[int]) -> Iterator[Told]:
-    """What arrives on faces."""
-    for at in range(0, len(faces), _TOGETHER):
-        sheets = _sheets(light.exchange, faces[at : at + _TOGETHER])
-        counts = np.array([sheet.u.size * sheet.v.size for sheet in sheets])
-        met = Hits(*map(np.concatenate, zip(*(sheet.met for sheet in sheets), strict=True)))
-        first = np.repeat(np.cumsum(counts) - counts, [len(sheet.met.starts) for sheet in sheets])
-        rays = np.repeat([sheet.rays for sheet in sheets], counts)
-        values = light.gathered(met._replace(starts=met.starts + first), counts.sum(), rays)
-        yield from map(_spline, sheets, np.split(values, np.cumsum(counts)[:-1]))
-
-
-def _spline(sheet: Sheet, values: np.ndarray) -> Told:
-    """Of values (n,) at the nodes of a face."""
-    from scipy.interpolate import RectBivariateSpline  # slow to load, and rarely needed
-
-    places, values = [sheet.u, sheet.v], values.reshape(sheet.u.size, sheet.v.size)
-    if sheet.frame.closed:
-        places[0], values = np.arange(-3, sheet.u.size + 3), np.pad(values, ((3, 3), (0, 0)), "wrap")
-    for axis, (size, count) in enumerate(zip(sheet.frame.size, values.shape, strict=True)):
-        if count == 1:
-            places[axis], values = np.array([0.0, size]), np.repeat(values, 2, axis)
-    along, across = (min(3, n - 1) for n in values.shape)
-    return Told(sheet.frame, RectBivariateSpline(*places, values, kx=along, ky=across))
 
 
 @lru_cache(maxsize=4)
@@ -409,7 +279,7 @@ def _seeing(bodies: Solid, floor: Floor | None) -> np.ndarray:
         return np.flatnonzero(inner)
     highest = np.full(len(bodies.faces), -np.inf)
     np.maximum.at(highest, bodies.triangle_faces, bodies.triangles[..., 2].max(1))
-    standing = highest <= floor.height + _LIFT * bodies.extent
+    standing = highest <= floor.height + LIFT * bodies.extent
     return np.append(np.flatnonzero((inner | (bodies.normals[:, 2] < _UP)) & ~standing), len(bodies.faces))
 
 
@@ -419,7 +289,7 @@ def _placed(points: np.ndarray, normals: np.ndarray, cell: float) -> np.ndarray:
 
 
 @kept(most=2048)
-def _sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
+def sheets(exchange: Exchange, faces: list[int]) -> Iterator[Sheet]:
     """Of faces, those of as many rays a node looked at together."""
     bare = [_bare(exchange, face) for face in faces]
     found: dict[int, Hits] = {}
@@ -482,78 +352,3 @@ def _nodes_around(exchange: Exchange, wall: Wall) -> tuple[Sheet, np.ndarray, np
     rays = _ROUGH_NODE if exchange.roughly else _FROM_WALL
     sheet = Sheet(wall, np.arange(wall.count), wall.rows, NOTHING_MET, rays)
     return sheet, nodes, normals_at(exchange.solid, faces, nodes), shifts(len(nodes))
-
-
-@lru_cache(maxsize=8)
-def exchanged(
-    scene: Scene, emitters: tuple[Emitter, ...], roughly: bool = False, without: tuple[int, ...] = ()
-) -> Exchanged | None:
-    """What the faces of a scene's bodies and its floor send to each other under some emitters, some left out."""
-    rims = () if roughly else measured_rims(scene)
-    exchange = exchange_of(scene.bodies, scene.bright_floor, roughly, rims, without)
-    if exchange is None:
-        return None
-    met = exchange.seen
-    several = met._replace(rays=np.arange(len(met.rays)))  # of few rays from a place no emitter is asked for none
-    lit = _white(scene, met.faces) * _direct(scene, emitters, exchange.solid, several)
-    whites = exchange.of_patches(_white(scene, exchange.places.faces))
-    once = exchange.of_patches(np.bincount(met.starts, lit, len(exchange.patches)) / exchange.rays)
-    arriving = more = once
-    for _ in range(_BOUNCES):
-        more = exchange.between @ (whites * more)
-        arriving = arriving + more
-        if more.max() <= _LEFT * arriving.max():
-            break
-    return Exchanged(scene, emitters, exchange, arriving)
-
-
-def once_reflected(
-    scene: Scene, emitters: tuple[Emitter, ...], points: np.ndarray, normals: np.ndarray, own: tuple[int, ...]
-) -> np.ndarray:
-    """Irradiance of points (n, 3) of unit normals by light that met one other face of the bodies, (n,).
-
-    Each sees others by other rays; facets ``own`` of the surface that the points lie on are none.
-    """
-    bodies = scene.bodies
-    ways = ways_about(normals, (in_unit_square(_REFLECTED) + shifts(len(points))[:, None]) % 1.0)
-    starts = np.broadcast_to((points + _LIFT * bodies.extent * normals)[:, None], ways.shape)
-    face, t = first_face(bodies, starts, ways, own)
-    point, ray = np.nonzero(face >= 0)
-    met, faces = starts[point, ray] + t[point, ray, None] * ways[point, ray], face[point, ray]
-    lit = sum(_arriving(scene, each, met, normals_at(bodies, faces, met)) for each in emitters)
-    return np.bincount(point, _white(scene, faces) * lit, len(points)) / _REFLECTED
-
-
-def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
-    """Diffuse reflectance of faces (n,)."""
-    white = np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds]
-    return np.append(white, 0.0 if scene.floor is None else scene.floor.reflectance)[faces]
-
-
-def _direct(scene: Scene, emitters: tuple[Emitter, ...], solid: Solid, met: Hits) -> np.ndarray:
-    """Irradiance from emitters where rays end, (k,); of several each is asked for every so manieth ray."""
-    found = np.zeros(len(met.points))
-    for at in range(0, len(found), _AT_ONCE):  # in blocks, which bounds the memory
-        part = slice(at, at + _AT_ONCE)
-        found[part] = _direct_of_few(scene, emitters, solid, Hits(*(each[part] for each in met)))
-    return found
-
-
-def _direct_of_few(scene: Scene, emitters: tuple[Emitter, ...], solid: Solid, met: Hits) -> np.ndarray:
-    found, several = np.zeros(len(met.points)), len(emitters)
-    for k, emitter in enumerate(emitters):
-        asked = met.rays % several == k
-        normals = normals_at(solid, met.faces[asked], met.points[asked])
-        found[asked] = several * _arriving(scene, emitter, met.points[asked], normals)
-    return found
-
-
-def _arriving(scene: Scene, emitter: Emitter, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Irradiance of points (n, 3) of unit normals by one emitter, 0 in shadow."""
-    arriving = beam(emitter, points)
-    found = arriving.strength * np.maximum(np.einsum("ni,ni->n", arriving.to_light, normals), 0)
-    turned = np.flatnonzero(found)
-    start, at = points[turned] + _LIFT * scene.bodies.extent * normals[turned], np.array(emitter.at)
-    blocker, t = first_face(scene.bodies, np.broadcast_to(at, start.shape), start - at, (), margin=_MARGIN)
-    found[turned[(blocker >= 0) & (t < 1)]] = 0.0
-    return found

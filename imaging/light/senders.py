@@ -10,17 +10,18 @@ import numpy as np
 
 from imaging.geometry.measured import measured_pieces
 from imaging.light.emitters import emitters, plain
-from imaging.light.exchange import Exchange, exchanged
+from imaging.light.exchange import Exchange
+from imaging.light.exchanged import exchanged
 from imaging.light.places import shifts
 from imaging.pictures import Pictures
-from scenes import Picture, Solid
+from scenes import Picture
 from scenes.lights import GLANCE
 from scenes.parts.rows import different
 from scenes.parts.shading import normals_at
 
 _OF_WAY = 0.7  # of the way to what it sees nearest: the side of a piece
 _PLACES, _LOOKS = 4, 4  # from which a piece looks for it, its corners and its middle, and rays from each
-_AT_ONCE = 1 << 14  # pieces whose rays, or normals, are asked for together
+_AT_ONCE = 1 << 14  # pieces whose rays are asked for together
 _FINER, _FINEST = 4.0, 16.0  # times smaller than cells pieces are at most, and beside what is measured
 _OF_DISTANCE = 0.5  # of that from what is measured: so small pieces may be there
 _WITHIN = 0.02  # of the way from a corner to the middle
@@ -59,7 +60,7 @@ def senders(picture: Picture) -> Senders | None:
         return None
     exchange = light.exchange
     triangles, faces = _pieces(exchange, measured_pieces(scene))
-    normals = _normals(exchange.solid, triangles, faces)
+    normals = normals_at(exchange.solid, faces[:, None], triangles)
     points, owners, which = _places(triangles, normals, faces, scene.surfaces.kinds, exchange.cell)
     return Senders(triangles, normals, faces, scene.camera.exposure * light.sent_at(points, owners)[which])
 
@@ -122,15 +123,6 @@ def _nearest(exchange: Exchange, triangles: np.ndarray, faces: np.ndarray) -> np
         met = exchange.met(points, normals.repeat(_PLACES, 0), _LOOKS, shifted[at : at + _AT_ONCE].reshape(-1, 2))
         away = np.linalg.norm(met.points - points[met.starts], axis=1)
         np.minimum.at(found, here.repeat(_PLACES)[met.starts], away)
-    return found
-
-
-def _normals(solid: Solid, triangles: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Of the surfaces in the corners of triangles (n, 3, 3) of faces (n,), as the triangles."""
-    found = np.empty(triangles.shape)
-    for at in range(0, len(faces), _AT_ONCE):  # in blocks, which bounds the memory
-        part = slice(at, at + _AT_ONCE)
-        found[part] = normals_at(solid, faces[part, None], triangles[part])
     return found
 
 

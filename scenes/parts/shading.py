@@ -19,6 +19,7 @@ from scenes.parts.rows import different
 from scenes.parts.solid import Solid
 
 _UNSURE = 1e-3  # rad: a facet that rounding may turn by so much counts half
+_AT_ONCE = 1 << 16  # points
 _MOST = np.cos(np.radians(31.0))  # what bends by more is no facet of the same surface
 
 
@@ -37,15 +38,16 @@ def normals_at(solid: Solid, faces: np.ndarray | int, points: np.ndarray) -> np.
     True
     """
     faces = np.asarray(faces)
-    found = solid.normals.take(faces, 0)
-    facet = ~solid.plane[faces]
+    shape = np.broadcast_shapes(faces.shape, points.shape[:-1])
+    found, facet = np.broadcast_to(solid.normals.take(faces, 0), (*shape, 3)), ~solid.plane[faces]
     if not facet.any():
         return found
-    shape = np.broadcast_shapes(faces.shape, points.shape[:-1])
-    found = np.broadcast_to(found, (*shape, 3)).copy()
+    found = found.copy()
     facet, faces = np.broadcast_to(facet, shape), np.broadcast_to(faces, shape)
-    places = chosen(np.broadcast_to(points, (*shape, 3)), facet)
-    found.reshape(-1, 3)[np.flatnonzero(facet)] = _within(solid, faces[facet], places)
+    places, faces, rows = chosen(np.broadcast_to(points, (*shape, 3)), facet), faces[facet], np.flatnonzero(facet)
+    for at in range(0, len(rows), _AT_ONCE):  # in blocks, which bounds the memory
+        part = slice(at, at + _AT_ONCE)
+        found.reshape(-1, 3)[rows[part]] = _within(solid, faces[part], places[part])
     return found
 
 

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 import scenes
-from imaging.light import exchange
+from imaging.light import exchange, exchanged
 from imaging.light.annulus import Annulus
 from imaging.light.emitters import emitters, plain
 from imaging.light.places import Places
@@ -85,12 +85,12 @@ def test_the_ground_beside_a_rim_has_the_light_that_paths_tell(cup, monkeypatch)
     expected = paths * shining.power
 
     def off():
-        for each in (exchange.exchanged, exchange.exchange_of):
+        for each in (exchanged.exchanged, exchange.exchange_of):
             each.cache_clear()
-        return exchange.exchanged(scene, (shining,)).at(points, faces) / expected - 1
+        return exchanged.exchanged(scene, (shining,)).at(points, faces) / expected - 1
 
     assert np.sqrt(np.mean(off() ** 2)) < 0.06  # margin: twice what is measured; 2.8 %
-    monkeypatch.setattr(exchange, "measured_rims", lambda scene: ())
+    monkeypatch.setattr(exchanged, "measured_rims", lambda scene: ())
     assert np.sqrt(np.mean(off() ** 2)) > 0.07  # margin: 9 %
 
 
@@ -106,7 +106,7 @@ def test_the_ground_about_an_inner_edge_has_the_light_that_paths_tell(tmp_path):
     points = rim.centre + (rim.radius + 0.15) * rim.spokes(rim.angles(24))
     white, rng = scene.material.diffuse(), np.random.default_rng(1)
     paths = traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng) * shining.power
-    told = exchange.exchanged(scene, (shining,)).at(points, np.full(24, rim.face))
+    told = exchanged.exchanged(scene, (shining,)).at(points, np.full(24, rim.face))
     assert np.sqrt(np.mean((told / paths - 1) ** 2)) < 0.075  # margin: twice what is measured; 3.6 %
 
 
@@ -121,10 +121,10 @@ def test_light_that_met_several_faces_is_as_paths_tell(tmp_path, monkeypatch):
     points = rim.centre + (rim.radius + 0.1) * rim.spokes(rim.angles(24))
     white, rng = scene.material.diffuse(), np.random.default_rng(1)
     paths = traced(scene.solid, white, np.array(shining.at), points, rim.axis, 1 << 13, rng).mean() * shining.power
-    monkeypatch.setattr(exchange, "measured_rims", lambda scene: scene.solid.rims)
-    exchange.exchanged.cache_clear()
-    light = exchange.exchanged(scene, (shining,))
-    exchange.exchanged.cache_clear()
+    monkeypatch.setattr(exchanged, "measured_rims", lambda scene: scene.solid.rims)
+    exchanged.exchanged.cache_clear()
+    light = exchanged.exchanged(scene, (shining,))
+    exchanged.exchanged.cache_clear()
     met = light.exchange.met(points, np.broadcast_to(rim.axis, points.shape), 1 << 12)
     told = light.gathered(met, 24, 1 << 12).mean()
     assert told == pytest.approx(paths, rel=0.03)  # margin: five times what is measured; 0.6 %

@@ -9,7 +9,7 @@ import pytest
 import scenes
 from imaging.geometry.looked_at import looked_at
 from imaging.geometry.projection import facing, project_ideal, sensor_position
-from imaging.light import exchange
+from imaging.light import exchanged
 from imaging.light.between import light_between, light_of_dimmed
 from imaging.pictures import Pictures
 from render.between import lent_to
@@ -139,7 +139,7 @@ def test_a_limb_that_is_measured_leaves_light_between_other_faces_as_it_is(tmp_p
 
     Facets of the round wall whose limb is measured have a model of their own, and none here.
     """
-    monkeypatch.setattr(exchange, "measured_rims", lambda scene: ())
+    monkeypatch.setattr(exchanged, "measured_rims", lambda scene: ())
     file = written(flange(), tmp_path / "flange.step")
     told = {"name": "d", "kind": "diameter", "tolerance": 0.05}
     plain = scenes.load("bracket_mm").model_dump(exclude={"measurands", "settings"})

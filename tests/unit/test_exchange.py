@@ -9,10 +9,12 @@ import trimesh
 
 import scenes
 from imaging.light import exchange as exchange_module
+from imaging.light import exchanged as exchanged_module
 from imaging.light.between import light_between
 from imaging.light.bore import _form_factors, _is_wall, bores
 from imaging.light.emitters import emitters, plain
-from imaging.light.exchange import Hits, _arriving, _nodes, exchange_of, exchanged, room
+from imaging.light.exchange import Hits, _nodes, exchange_of, room
+from imaging.light.exchanged import _arriving, exchanged
 from imaging.light.nodes import _rim, frame_of, onto
 from imaging.light.places import Places, in_unit_square, shifts
 from imaging.pictures import Pictures
@@ -169,8 +171,8 @@ def test_light_where_many_rays_end_is_asked_for_in_blocks(monkeypatch):
         sizes.append(len(points))
         return _arriving(scene, emitter, points, normals)
 
-    monkeypatch.setattr(exchange_module, "_arriving", counted)
-    monkeypatch.setattr(exchange_module, "_AT_ONCE", 100)
+    monkeypatch.setattr(exchanged_module, "_arriving", counted)
+    monkeypatch.setattr(exchanged_module, "AT_ONCE", 100)
     assert np.array_equal(light.gathered(met, 70, 64), whole)
     assert whole.any()
     assert max(sizes) <= 100 < sum(sizes)
@@ -244,10 +246,10 @@ def test_a_round_wall_is_told_as_many_rays_tell_it(slot_end):
 def test_few_rays_tell_a_round_wall_wrongly(slot_end, monkeypatch):
     """The control of the test above: an eighth of the rays are off by more than it allows."""
     monkeypatch.setattr(exchange_module, "_FROM_WALL", 128)
-    for kept in (exchange_module._sheets, exchange_module._told):
+    for kept in (exchange_module.sheets, exchanged_module._told):
         kept.cache_clear()
     told, expected = _told_beside_many_rays(slot_end)
-    for kept in (exchange_module._sheets, exchange_module._told):
+    for kept in (exchange_module.sheets, exchanged_module._told):
         kept.cache_clear()
     assert np.sqrt(np.mean((told / expected - 1) ** 2)) > 0.03  # margin: twice what is promised; 5.7 %
 
@@ -264,16 +266,16 @@ def test_faces_are_told_together_what_each_is_told_alone(slot_end, monkeypatch):
     light, facets, _ = slot_end
     exchange, faces = light.exchange, [*facets[:3], *np.flatnonzero(light.exchange.solid.plane)]
     faces = [int(face) for face in faces if exchange.has[face]]
-    together = list(exchange_module._sheets.__wrapped__(exchange, faces))
+    together = list(exchange_module.sheets.__wrapped__(exchange, faces))
     assert len({sheet.rays for sheet in together}) == 2
     for face, sheet in zip(faces, together, strict=True):
-        (alone,) = exchange_module._sheets.__wrapped__(exchange, [face])
+        (alone,) = exchange_module.sheets.__wrapped__(exchange, [face])
         assert all(np.array_equal(*both) for both in zip(sheet.met, alone.met, strict=True))
         assert len(sheet.met.starts) > 0
         assert sheet.met.starts.max() < sheet.u.size * sheet.v.size
-    told = list(exchange_module._told.__wrapped__(light, faces))
+    told = list(exchanged_module._told.__wrapped__(light, faces))
     for face, each in zip(faces, told, strict=True):
-        (alone,) = exchange_module._told.__wrapped__(light, [face])
+        (alone,) = exchanged_module._told.__wrapped__(light, [face])
         places = light.exchange.solid.triangles[light.exchange.solid.triangle_faces == face].mean(1)
         assert np.array_equal(each.at(places), alone.at(places))
 

@@ -8,6 +8,7 @@ import scenes
 from imaging.light import exchange
 from imaging.light.bore import bores
 from imaging.light.emitters import emitters, plain
+from imaging.light.exchanged import exchanged
 from imaging.light.walls import wall
 from imaging.pictures import Pictures
 from scenes.lights import GLANCE
@@ -105,7 +106,7 @@ def test_a_cone_has_the_same_light_whatever_its_facets_are(tmp_path, monkeypatch
         faces = np.repeat(faces[away.argmax(1)][:, None], part.size, 1)
         radius = np.broadcast_to(3 + 2 * part, faces.shape)
         points = np.stack([radius * np.cos(angle)[:, None], radius * np.sin(angle)[:, None], radius * 1.5 + 0.5], -1)
-        found.append(exchange.exchanged(scene, (shining,)).at(points, faces))
+        found.append(exchanged(scene, (shining,)).at(points, faces))
     off = np.sqrt(np.mean((found[0] / found[1] - 1) ** 2))
     assert off < 0.015  # margin: twice what is measured; 0.7 %
 
@@ -123,6 +124,6 @@ def test_walls_of_bores_send_light_to_others(tmp_path):
     points = np.array([[x, y, -0.5] for x, y in ((0, 0), (0.6, 0), (-0.6, 0), (0, 0.6), (0, -0.6))], float)
     white, rng = scene.material.diffuse(), np.random.default_rng(1)
     paths = traced(solid, white, np.array(shining.at), points, solid.normals[top], 1 << 14, rng) * shining.power
-    told = exchange.exchanged(scene, (shining,)).at(points, np.full(5, top))
+    told = exchanged(scene, (shining,)).at(points, np.full(5, top))
     assert (paths > 0).all()
     assert told / paths == pytest.approx(np.ones(5), abs=0.04)  # margin: twice what is measured; 1.8 %

@@ -5,10 +5,11 @@ import pytest
 import trimesh
 
 import scenes
-from imaging.light import exchange as exchange_module
+from imaging.light import exchanged as exchanged_module
 from imaging.light import senders as senders_module
 from imaging.light.emitters import emitters, plain
-from imaging.light.exchange import Exchanged, exchange_of, room
+from imaging.light.exchange import exchange_of, room
+from imaging.light.exchanged import Exchanged
 from imaging.light.senders import senders
 from imaging.pictures import Pictures
 from scenes import Picture
@@ -124,7 +125,7 @@ def test_the_ground_of_a_shallow_groove_sends_on_what_paths_tell(groove):
 def test_places_are_asked_in_blocks(picture, monkeypatch):
     """Of so many rays at most, which bounds the memory; what they send is the same to the last digit."""
     whole, asked = senders(picture).sent, []
-    monkeypatch.setattr(exchange_module, "_AT_ONCE", 100 * exchange_module._FROM_PIECE)
+    monkeypatch.setattr(exchanged_module, "AT_ONCE", 100 * exchanged_module._FROM_PIECE)
     gathered = Exchanged.gathered
     counted = lambda self, met, count, rays: asked.append(count) or gathered(self, met, count, rays)  # noqa: E731
     monkeypatch.setattr(Exchanged, "gathered", counted)

@@ -26,7 +26,7 @@ from imaging.features.projected_edges import projected_edges
 from imaging.geometry.projection import direction, edge_points
 from imaging.light.edge_sides import edge_contrast, side_signals
 from imaging.light.emitters import emitters
-from imaging.light.exchange import _arriving, exchanged
+from imaging.light.exchanged import _arriving, exchanged
 from imaging.pictures import Pictures
 from measure.features.layout import BACKGROUND, polygon_layout
 from measure.features.optics import Optics
