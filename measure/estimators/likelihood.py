@@ -110,7 +110,9 @@ class LikelihoodEstimator:
         edges, n = len(self.calipers), len(found)
         p = found[:, : 2 * edges].reshape(n, edges, 2)
         start, stop = found[:, 2 * edges : 3 * edges], found[:, 3 * edges :]
-        contrast = np.stack([start, (stop - start) / np.array([caliper.length for caliper in self.calipers])], -1)
+        with np.errstate(invalid="ignore"):  # an edge that is not visible has no length
+            change = (stop - start) / np.array([caliper.length for caliper in self.calipers])
+        contrast = np.stack([start, change], -1)
         level, slope = np.moveaxis((self._to_lines(contrast) @ p[..., None])[..., 0], -1, 0)
         size = np.sqrt(np.diag(self.unit)[2 * edges : 3 * edges] + np.diag(self.unit)[3 * edges :]) / 2
         error = np.sqrt(self.optics.noise_variance) * size

@@ -102,7 +102,7 @@ class Optics:
         """Variance of the noise at grey levels; None where it is ``noise_variance`` for all of them."""
         if self.noise is None:
             return None
-        if self.noise.gain == 0 and levels.max() <= headroom(self.noise) + self.noise.dark_level:
+        if self.noise.gain == 0 and levels.max(initial=-np.inf) <= headroom(self.noise) + self.noise.dark_level:
             return None
         return expected(self.noise, levels).noise_variance
 

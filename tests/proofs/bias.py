@@ -89,17 +89,18 @@ def moved(pose: Pose, rng: np.random.Generator) -> Pose:
 
 
 def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: str | None = None) -> Pulls:
-    """Of a picture, its reflectances and lights drawn anew in each trial."""
+    """Of a picture, its reflectances and lights drawn anew in each trial; by the estimator that `ice measure` takes."""
     scene, rng = picture.scene, np.random.default_rng(seed)
-    method = Method(estimator or measure.best_estimator(scene))
-    off = simulation.simulated(picture, method)
-    everywhere = off.adjusted is not None or not measure.ESTIMATORS[method.locator].local
+    off = simulation.simulated(picture, Method(estimator)) if estimator else simulation.best(picture)
+    everywhere = off.adjusted is not None or not measure.ESTIMATORS[off.estimator].local
     (true, own), left, noisy = _true(picture, off), [], []
     for trial in range(trials):
         actual = Picture(deviating(scene, rng), picture.sensor, tuple(moved(pose, rng) for pose in picture.lights))
         clean = render.image(actual, quality=render.Quality(seed=_SEEDS + trial, everywhere=everywhere))
         exposed = render.expose(clean, scene.noise, rng, images)
-        found = measure.measure(np.concatenate([clean[None], exposed]), picture, correction=off)
+        found = measure.measure(
+            np.concatenate([clean[None], exposed]), picture, correction=off, estimator=off.estimator
+        )
         away = np.where(is_trusted(found.status), found.value - true, np.nan)
         beside = np.hypot(_by_inputs(found.u_bias, off), np.hypot(off.sources[RENDERING], own))
         left.append(away[0] / beside[0])

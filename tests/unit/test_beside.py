@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+import measure
+import scenes
 from measure.estimators.beside import displacement
 from measure.estimators.isophote import _side
 from measure.estimators.separate import calipers_for, thinned
@@ -125,3 +127,13 @@ def test_a_plain_scene_and_one_of_unknown_light_have_no_looks(task1):
     floored = task1.with_(floor=Floor(reflectance=0.3, height=-2.0))
     assert layout_of(Picture(floored, setting.sensor)).looks is None
     assert isinstance(layout_of(Picture.of(floored, setting.sensor, setting.light)).looks, Looks)
+
+
+@pytest.mark.parametrize("sensor", [(30, 180), (70, 180)])
+@pytest.mark.parametrize("name", ["isophote", "strip"])
+def test_of_edges_that_are_not_visible_nothing_is_told(name, sensor):
+    """Of some from the first place, of all from the second one: without an error or a warning."""
+    scene = scenes.load("bracket")
+    noise = np.random.default_rng(0).normal(60, 5, (scene.camera.height, scene.camera.width))
+    found = measure.measure(noise, Picture.of(scene, sensor, (20, 40)), estimator=name)
+    assert found.status.tolist() == ["not_visible"]
