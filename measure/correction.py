@@ -88,7 +88,7 @@ def correction(
     Raises
     ------
     InvalidInput
-        If there is no render, an image has not the camera's size, or the lights are not known.
+        If there is no render, an image or what is changed of it has not the camera's size, or the lights are not known.
     """
     if not images.renders:
         raise InvalidInput("renders must be at least one noise-free image, got none")
@@ -181,7 +181,7 @@ def _levels(images: Images, clean: np.ndarray, picture: Picture) -> np.ndarray:
     of the renders' mean."""
     noise, size = picture.scene.noise, (picture.scene.camera.height, picture.scene.camera.width)
     alike = *images.renders, *images.beside
-    changes = [some[[k]] for some in images.changed.values() for k in range(some.shape[0])]
+    changes = [row for name, some in images.changed.items() for row in _rows(name, some, size)]
     levels = np.empty((len(alike) + len(changes) + 1, *size))
     for level, image in zip(levels, alike, strict=False):
         level[:] = seen(noise, checked_image(image, size)).level
@@ -189,6 +189,15 @@ def _levels(images: Images, clean: np.ndarray, picture: Picture) -> np.ndarray:
         _change(level, images.renders[0], levels[0], change, noise)
     levels[-1] = seen(noise, clean).level
     return levels
+
+
+def _rows(name: str, changed: sparse.csr_array, size: tuple[int, int]) -> list[sparse.csr_array]:
+    """What each input of a source changes, (1, height * width) each."""
+    if changed.shape[1] != size[0] * size[1]:
+        raise InvalidInput(
+            f"changed[{name!r}] must have {size[0] * size[1]} columns, a pixel each, got {changed.shape}"
+        )
+    return [changed[[k]] for k in range(changed.shape[0])]
 
 
 def _change(level: np.ndarray, first: np.ndarray, recorded: np.ndarray, change: sparse.csr_array, noise: Noise) -> None:

@@ -123,6 +123,8 @@ def test_bad_input_is_one_line(small_task1):
         measure.correction(Images(()), known)
     with pytest.raises(InvalidInput, match="light must be a pose to correct the bias, got nothing"):
         measure.correction(Images((image,)), unknown)
+    with pytest.raises(InvalidInput, match=r"changed\['pose'\] must have 8640 columns, a pixel each, got \(2, 4\)"):
+        measure.correction(Images((image, image), {"pose": sparse.csr_array((2, 4))}), known)
 
 
 @pytest.mark.render
