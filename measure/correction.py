@@ -201,12 +201,15 @@ def _rows(name: str, changed: sparse.csr_array, size: tuple[int, int]) -> list[s
 
 
 def _change(level: np.ndarray, first: np.ndarray, recorded: np.ndarray, change: sparse.csr_array, noise: Noise) -> None:
-    """Write what is recorded of a changed image into ``level``; without filters pixels are by themselves."""
+    """Write what is recorded of the first render with a change into ``level``; ``recorded`` is that of the render."""
     some = change.indices
     changed = first.ravel()[some] + change.data
-    level[:] = recorded if noise.colour is None else first
-    level.ravel()[some] = seen(noise, changed).level if noise.colour is None else changed
-    if noise.colour is not None:
+    if noise.colour is None:  # each pixel by itself
+        level[:] = recorded
+        level.ravel()[some] = seen(noise, changed).level
+    else:
+        level[:] = first
+        level.ravel()[some] = changed
         level[:] = seen(noise, level).level
 
 

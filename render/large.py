@@ -140,6 +140,14 @@ def fine_pixels(
         if is_large(crop, k, random=True):  # else few rays at all would tell the variances badly
             moving = fine_of(near_required(picture, crop, k, _MOVING), k)
         fine = _with_random(renders, fine, plain & moving, plain & ~np.asarray(moving), close_by)
+    return _at_edges(renders, fine, marked, close, lent, many)
+
+
+def _at_edges(
+    renders: Renders, fine: np.ndarray, marked: np.ndarray, close: np.ndarray, lent: np.ndarray | None, many: int
+) -> np.ndarray:
+    """The image with its marked fine pixels, which an edge crosses, and then those beside them that turn out to be
+    crossed, too, by many rays where they are close to what is measured."""
     parts = [(marked & ~close, min(many, _BESIDE)), (marked & close, many)] if renders.everywhere else [(marked, many)]
     for where, count in parts:
         for random, some in _by_light(where, lent) if renders.random else [(False, where)]:

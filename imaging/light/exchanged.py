@@ -113,13 +113,13 @@ class Exchanged:
         return np.bincount(met.starts, sent, count) / rays
 
 
-def _numbered(faces: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+def _numbered(numbers: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     """Each of the numbers (n,) and where it stands, in rising order."""
-    order = np.argsort(faces, kind="stable")
-    starts = np.flatnonzero(np.append(faces.size > 0, np.diff(faces[order])))
+    order = np.argsort(numbers, kind="stable")
+    starts = np.flatnonzero(np.append(numbers.size > 0, np.diff(numbers[order])))
     for here in np.split(order, starts[1:]):
         if here.size:
-            yield int(faces[here[0]]), here
+            yield int(numbers[here[0]]), here
 
 
 @dataclass(frozen=True, eq=False)

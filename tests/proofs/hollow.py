@@ -197,7 +197,7 @@ def hollow(
     images: Annotated[int, typer.Option(help="Noisy images a trial.")] = 3,
     seed: Annotated[int, typer.Option()] = 1,
 ) -> None:
-    """Random hollow parts at random poses: what is visible is `ok`, and what is `ok` is right; an hour."""
+    """Random hollow parts at random poses: what is visible is `ok`, and what is `ok` is right; some hours."""
     rng, rows = np.random.default_rng(seed), []
     with tempfile.TemporaryDirectory() as folder:
         for number in range(count):

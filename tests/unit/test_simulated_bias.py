@@ -12,13 +12,15 @@ from scipy.sparse import csr_array
 import measure
 import planner
 import scenes
+from imaging.colour import seen
 from imaging.geometry.projection import project
 from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from measure import Correction, Images
-from measure.correction import _with_pooled
+from measure.correction import _levels, _with_pooled
 from render import EffectTolerance, Quality
 from scenes import Picture, Pose
+from scenes.cameras.colour import Colour
 from scenes.status import allowed
 from tests.oracle import block_image
 from validation import kept, simulation
@@ -671,3 +673,18 @@ def test_what_few_rays_tell_of_all_levels_moves_no_edge():
     with_spot = first + np.array([[0.0, 0.0, 0.0, 5.0]])
     assert after(first, with_spot) == pytest.approx(with_spot, rel=1e-12)
     assert after(0 * here, 0 * here).tolist() == [[0.0] * 4]
+
+
+@pytest.mark.parametrize("filters", [False, True])
+def test_what_is_recorded_of_a_changed_render_is_that_of_the_whole_image(filters):
+    """Also where filters mix neighbours, and where the end of the scale cuts off what is changed."""
+    scene = scenes.load("task1")
+    noise = scene.noise.tried(colour=Colour(pattern="RGGB", demosaicing="bilinear") if filters else None)
+    scene = scene.tried(noise=noise)
+    rng, size = np.random.default_rng(5), (scene.camera.height, scene.camera.width)
+    first, change = rng.uniform(20, 254, size), np.zeros(size)
+    change[40:60, 30:90] = rng.normal(0, 5, (20, 60))
+    images = Images((first,), {"pose": csr_array(change.reshape(1, -1))})
+    levels = _levels(images, first, Picture.of(scene, *POSES))
+    assert levels[1] == pytest.approx(seen(scene.noise, first + change).level, rel=1e-12)
+    assert np.abs(levels[1] - levels[0]).max() > 1
