@@ -18,7 +18,7 @@ _NONE = np.empty(0, int)
 _AT_ONCE = 1 << 18  # pixels, which bounds the memory
 
 
-def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.ndarray:
+def image(scene: Scene | Picture, sensor: Any = None, light: Any = None, where: np.ndarray | None = None) -> np.ndarray:
     """Noise-free grey levels, as `render.image` has them, from the image model alone.
 
     Parameters
@@ -27,6 +27,8 @@ def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.n
         One convex body before darkness, without textures.
     sensor, light : Pose or pair of float
         Degrees; left out for a picture.
+    where : ndarray of bool, shape (height, width), optional
+        Pixels that are drawn, a board beside the part apart; the others are dark. All when not given.
 
     Returns
     -------
@@ -49,11 +51,13 @@ def image(scene: Scene | Picture, sensor: Any = None, light: Any = None) -> np.n
     if not picture.lights:
         raise InvalidInput("light must be given, got none")
     camera = picture.scene.camera
-    found = np.empty((camera.height, camera.width))
+    found = np.zeros((camera.height, camera.width))
+    drawn = np.ones(found.shape, bool) if where is None else where
     rows = max(_AT_ONCE // camera.width, 1)
     for top in range(0, camera.height, rows):
-        y, x = np.mgrid[top : min(top + rows, camera.height), : camera.width]
-        found[top : top + rows] = signal_at(Pictures.of(picture), x.ravel(), y.ravel()).reshape(x.shape)
+        y, x = np.nonzero(drawn[top : top + rows])
+        if x.size:
+            found[y + top, x] = signal_at(Pictures.of(picture), x, y + top)
     add_board(found, Pictures.of(picture))
     return found + picture.scene.noise.dark_level
 

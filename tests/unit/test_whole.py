@@ -32,6 +32,14 @@ def test_against_the_renderer_with_a_rolled_camera(task1):
     assert np.abs(planner.image(task1, (40, 160), (20, 280)) - rendered).max() > 50  # without the roll
 
 
+def test_some_of_the_pixels(task1, rng):
+    """They are what they are in the whole picture, by whatever pixels are drawn beside them."""
+    whole, where = planner.image(task1, *POSES[0]), rng.random((240, 256)) < 0.2
+    found = planner.image(task1, *POSES[0], where)
+    assert found[where] == pytest.approx(whole[where], rel=1e-12)
+    assert (found[~where] == task1.noise.dark_level).all()
+
+
 def test_refusals(task1):
     with pytest.raises(InvalidInput, match="scene must be one convex body before darkness, got one in which"):
         planner.image(scenes.load("bracket"), (30, 135), (15, 315))

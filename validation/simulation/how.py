@@ -27,7 +27,8 @@ _FINE, _COARSE = 4, 2  # fine pixels a pixel, each way, of images that are compa
 class How:
     """How noise-free images are made: as `render.image` takes it, and whether where nothing is measured, too.
 
-    ``predicted``: whether the closed form of the bias is that of whatever measures in them.
+    ``predicted``: whether the closed form of the bias is that of whatever measures in them; ``readers``: the estimators
+    that do, where they are known.
     """
 
     quality: Quality = Quality()
@@ -36,6 +37,7 @@ class How:
     tolerance: EffectTolerance = EffectTolerance()
     everywhere: bool = False
     predicted: bool = False
+    readers: tuple[str, ...] = ()
 
     def by(self, *methods: Method) -> How:
         """Everywhere, if one of the methods looks at more than the surroundings of what is measured."""
@@ -44,6 +46,7 @@ class How:
             self,
             everywhere=not all(each.local for each in kinds),
             predicted=all(each.bias_predicted for each in kinds),
+            readers=tuple(sorted({each.locator for each in methods})),
         )
 
     @property

@@ -22,6 +22,7 @@ from functools import cache, partial
 import numpy as np
 from scipy import sparse
 
+import measure
 from imaging.blurred.whole import image as drawn
 from imaging.blurred.whole import is_drawable
 from imaging.colour import seen
@@ -75,13 +76,18 @@ def completed(
         lines = {LIGHT: lines_by_lights(picture)}
     else:
         # bounced light takes four times as long in a large image, and changes u(light_place) by less than 0.1 sigma
-        drawing = cache(drawn)
+        drawing = cache(partial(drawn, where=_read(picture, how)))
         rendered = whole if is_below(picture, LARGE) else direct
         made = drawing if _is_drawn(picture, first, drawing) else rendered
         changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
     modelled.forget()
     changed = {name: some for name, some in changed.items() if some.shape[0]}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
+
+
+def _read(picture: Picture, how: How) -> np.ndarray | None:
+    """The pixels that are read of an image, as a mask; None where it is not known by what."""
+    return measure.region_of_interest(picture, estimators=how.readers) if how.readers else None
 
 
 def _is_drawn(picture: Picture, render: np.ndarray, drawing: Callable[[Picture], np.ndarray]) -> bool:
