@@ -13,7 +13,7 @@ from measure.boards.dots import dot_grid
 from measure.boards.marker_grid import marker_grid
 from measure.bounds import bound
 from measure.correction import Images, correction
-from measure.estimators.kinds import ESTIMATORS, EstimatorKind
+from measure.estimators.kinds import ESTIMATORS, EstimatorKind, mixed_estimator
 from measure.features.conic import Ellipse, fit_ellipse
 from measure.find.candidate import Candidate
 from measure.find.ellipse import find_ellipse
@@ -106,6 +106,7 @@ __all__ = [
     "measure",
     "measure_by",
     "measure_quadrilateral",
+    "mixed_estimator",
     "mtf",
     "next_board",
     "noise_curve",

@@ -54,4 +54,4 @@ def _prepared(layout: Layout, threshold: float) -> SeparateEstimator:
     return SeparateEstimator(calipers, by_points(optics, calipers, partial(gradient_locator, optics)))
 
 
-GRADIENT = EstimatorKind(_prepared, capture_px=1.5, exact_px=0.006, bias_predicted=True, local=True)
+GRADIENT = EstimatorKind(_prepared, capture_px=1.5, exact_px=0.006, bias_predicted=True, local=True, separate=True)

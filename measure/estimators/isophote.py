@@ -145,4 +145,4 @@ def _prepared(layout: Layout, threshold: float) -> SeparateEstimator:
     return SeparateEstimator(tuple(found), tuple(parts))
 
 
-ISOPHOTE = EstimatorKind(_prepared, capture_px=0.5, exact_px=0.003, local=True)
+ISOPHOTE = EstimatorKind(_prepared, capture_px=0.5, exact_px=0.003, local=True, separate=True)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import cast
 
 from measure.estimators.estimate import Estimator
+from measure.estimators.separate import SeparateEstimator
 from measure.features.layout import Layout
+from scenes import InvalidInput
 from scenes.registry import Registry
+
+_AND, _AT = ", ", " at "
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,8 @@ class EstimatorKind:
         Whether its bias is what `imaging.models.bias` says.
     local : bool
         Whether it looks at no pixel farther from its edges than the scene's `window_px` and the scale of its filter.
+    separate : bool
+        Whether it measures each edge by itself, so that others may be measured by another one (`mixed_estimator`).
     """
 
     prepare: Callable[[Layout, float], Estimator]
@@ -34,6 +41,57 @@ class EstimatorKind:
     exact_px: float
     bias_predicted: bool = False
     local: bool = False
+    separate: bool = False
+
+    def with_edges(self, other: EstimatorKind, edges: frozenset[str]) -> EstimatorKind:
+        """The kind that measures these edges, by their names, by another one."""
+
+        def prepare(layout: Layout, threshold: float) -> SeparateEstimator:
+            if not edges <= set(layout.names):
+                raise InvalidInput(f"estimator must be at edges that are measured, got {' '.join(sorted(edges))!r}")
+            tools = [cast("SeparateEstimator", kind.prepare(layout, threshold)) for kind in (self, other)]
+            of = [tools[name in edges] for name in layout.names]
+            return SeparateEstimator(
+                tuple(tool.calipers[e] for e, tool in enumerate(of)), tuple(tool.parts[e] for e, tool in enumerate(of))
+            )
+
+        return EstimatorKind(
+            prepare,
+            capture_px=min(self.capture_px, other.capture_px),
+            exact_px=max(self.exact_px, other.exact_px),
+            local=self.local and other.local,
+            separate=True,
+        )
 
 
-ESTIMATORS: Registry[EstimatorKind] = Registry("estimator")
+class Estimators(Registry[EstimatorKind]):
+    """By their names; by that of `mixed_estimator`, too, which is not listed."""
+
+    def __getitem__(self, name: str) -> EstimatorKind:
+        one, comma, rest = str(name).partition(_AND)
+        other, at, edges = rest.partition(_AT)
+        if not (comma and at):
+            return super().__getitem__(name)
+        pair = super().__getitem__(one), super().__getitem__(other)
+        if not all(kind.separate for kind in pair):
+            raise InvalidInput(f"estimator must be of two that measure each edge by itself, got {name!r}")
+        return pair[0].with_edges(pair[1], frozenset(edges.split()))
+
+
+def mixed_estimator(one: str, other: str, edges: Iterable[str]) -> str | None:
+    """Name of the estimator that measures as one does, but some edges, by their names, as another does.
+
+    None where one of the two does not measure each edge by itself.
+
+    Examples
+    --------
+    >>> mixed_estimator("gradient", "isophote", ["e7", "e3"])
+    'gradient, isophote at e3 e7'
+    >>> mixed_estimator("gradient", "arrangement", ["e7"])
+    """
+    if not all(ESTIMATORS[name].separate for name in (one, other)):
+        return None
+    return f"{one}{_AND}{other}{_AT}{' '.join(sorted(edges))}"
+
+
+ESTIMATORS = Estimators("estimator")

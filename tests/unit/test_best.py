@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 import measure
+import planner
 import render
 import scenes
 from measure import best
-from scenes import Picture, Pose
-from scenes.status import CLUTTER, ILL_CONDITIONED, OK
+from measure.features.layout import layout_of
+from measure.quantities import find
+from scenes import InvalidInput, Picture, Pose
+from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, OK, SIGN_CHANGE
 from validation import simulation
 from validation.remeasured import Method
 
@@ -70,10 +73,39 @@ def test_another_estimator_measures_where_it_alone_tells_the_value(states, taken
     assert seen == ["gradient", "isophote", "strip"][:asked]
 
 
+@pytest.mark.parametrize(
+    ("one", "other", "both", "taken"),
+    [
+        ((OK, CLUTTER, OK), (OK, OK, CLUTTER), (OK, OK, OK), "gradient, isophote at e4 e9"),
+        ((OK, LOW_CONTRAST, OK), (OK, OK, LOW_CONTRAST), (OK, OK, OK), "gradient, isophote at e4 e9"),
+        ((OK, CLUTTER, CLUTTER), (CLUTTER, OK, OK), (CLUTTER, OK, CLUTTER), "isophote"),  # they share an edge
+        ((OK, SIGN_CHANGE, OK), (OK, OK, OK), None, "isophote"),
+        ((OK, LOW_CONTRAST, OK), (OK, LOW_CONTRAST, OK), None, "gradient"),
+    ],
+)
+def test_each_edge_is_measured_by_the_estimator_that_tells_its_values(one, other, both, taken):
+    """Where each of two tells values that the other does not; the pair is asked once more, and taken if it tells
+    most."""
+    scene = scenes.load("grey_floor").with_(task=None, measurands=[
+        {"name": name, "kind": "angle", "features": [{"edge": first}, {"edge": last}]}
+        for name, first, last in (("a", "e7", "e11"), ("b", "e4", "e9"), ("c", "e4", "e11"))
+    ])  # fmt: skip
+    seen, made = made_up({"gradient": one, "isophote": other, "strip": (CLUTTER,) * 3})
+    _, mixed = made_up(dict.fromkeys(("gradient, isophote at e4 e9", "gradient, isophote at e11 e4 e9"), both))
+
+    def by(picture, method):
+        return made(picture, method) if method.locator in measure.ESTIMATORS else mixed(picture, method)
+
+    assert simulation.best(Picture.of(scene, (30, 15), (15, 315)), by).estimator == taken
+    assert seen[:2] == ["gradient", "isophote"]
+
+
 def test_images_above_a_megapixel_are_simulated_once_where_a_bias_is_not_known():
     """But where noise decides which edge it is, twice."""
     picture = Picture.of(scenes.load("bracket_mm"), (30, 40), (35, 67))
-    for state, asked in ((CLUTTER, ["gradient"]), (ILL_CONDITIONED, ["gradient", "isophote"])):
+    for state, asked in (
+        (CLUTTER, ["gradient"]), (LOW_CONTRAST, ["gradient"]), (ILL_CONDITIONED, ["gradient", "isophote"]),
+    ):  # fmt: skip
         seen, made = made_up({"gradient": state, "isophote": OK, "strip": OK})
         simulation.best(picture, made)
         assert seen == asked
@@ -88,16 +120,17 @@ def test_what_pixels_of_a_sensor_are_not_is_not_asked_of_them():
 
 
 def made_up(states):
-    """Names of estimators that were asked, and what makes corrections of states by estimator."""
+    """Names of estimators that were asked, and what makes corrections of states by estimator, of all values or each."""
     seen = []
 
     def made(picture, method):
         seen.append(method.locator)
-        state, count = states[method.locator], len(picture.scene.quantities)
-        bias, square = np.full(count, np.nan if state == ILL_CONDITIONED else 0.0), np.eye(count)
-        doubt = {"reflectance": np.full(count, 9.0 if state == CLUTTER else 0.1)}
-        given = picture.scene.quantities, method.locator, None, bias, bias, doubt, doubt, square, square
-        return measure.Correction(*given, (state,) * count)
+        count, given = len(picture.scene.quantities), states[method.locator]
+        each = (given,) * count if isinstance(given, str) else given
+        bias = np.array([0.0 if state in (OK, CLUTTER) else np.nan for state in each])
+        doubt = {"reflectance": np.array([9.0 if state == CLUTTER else 0.1 for state in each])}
+        of = picture.scene.quantities, method.locator, None, bias, bias, doubt, doubt, np.eye(count), np.eye(count)
+        return measure.Correction(*of, each)
 
     return seen, made
 
@@ -120,3 +153,37 @@ def test_where_noise_decides_for_edge_points_isophotes_measure():
     assert variance / expected.covariance[0, 0] == pytest.approx(1.0, abs=limit)
     assert variance / (2 * expected.covariance[0, 0]) != pytest.approx(1.0, abs=limit)
     assert abs(found.value[:, 0].mean() - expected.value[0]) < 4.5 * np.sqrt(variance / 400)
+
+
+def test_edges_by_two_estimators_are_each_what_its_own_finds(task1, rng):
+    """Lines and their covariance in noisy images; what is propagated, too, and that of edges of both."""
+    picture = Picture.of(task1, NEAR, FAR)
+    clean = planner.image(picture)
+    images = render.expose(clean, task1.noise, rng, 3)
+    mixed = measure.mixed_estimator("gradient", "isophote", ["e9", "e4"])
+    names = ("gradient", "isophote", mixed)
+    one, other, both = (find(images, picture, name).shape for name in names)
+    edges = layout_of(picture).names
+    for e, name in enumerate(edges):
+        own = other if name in ("e4", "e9") else one
+        assert (both.normals[:, e] == own.normals[:, e]).all()
+        assert (both.points[:, e] == own.points[:, e]).all()
+        here = slice(2 * e, 2 * e + 2)
+        assert (both.lines[:, here, here] == own.lines[:, here, here]).all()
+    assert not np.array_equal(one.points, other.points)  # margin
+    one, other, both = (measure.propagate(clean, picture, estimator=name).measurands for name in names)
+    assert both.status == ("ok",)
+    assert len({float(each.covariance[0, 0]) for each in (one, other, both)}) == 3
+    assert min(one.covariance, other.covariance) < both.covariance < max(one.covariance, other.covariance)
+
+
+def test_estimators_of_pairs_of_names(task1):
+    picture = Picture.of(task1, NEAR, FAR)
+    image = np.zeros((task1.camera.height, task1.camera.width))
+    with pytest.raises(InvalidInput, match="estimator must be of two that measure each edge by itself, got 'gradient,"):
+        measure.measure(image, picture, estimator="gradient, strip at e4")
+    with pytest.raises(InvalidInput, match="estimator must be at edges that are measured, got 'e400'"):
+        measure.measure(image, picture, estimator="gradient, isophote at e400")
+    with pytest.raises(InvalidInput, match=r"estimator must be one of canny, .*, got 'sobel'"):
+        measure.measure(image, picture, estimator="sobel, isophote at e4")
+    assert measure.mixed_estimator("strip", "isophote", ["e4"]) is None

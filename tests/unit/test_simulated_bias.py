@@ -442,7 +442,7 @@ def test_textures_of_which_nobody_knows_how_they_lie_are_left_out_and_count_in_u
     """The simulation is of the part without them; u(bias) has what the gradient locator's closed form tells."""
     asked = []
 
-    def quiet(picture, method, how):
+    def quiet(picture, method, how, shown):
         asked.append(picture)
         told = measure.propagate(block_image(small_task1, *POSES), picture, estimator=method.locator)
         return _made(picture), told.measurands
@@ -499,7 +499,7 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
     camera = picture.scene.camera.model_copy(update=size)
     large = picture.with_scene(picture.scene.model_copy(update={"camera": camera}))
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
-    monkeypatch.setattr(corrections, "completed", lambda picture, renders, *given: asked.append(renders))
+    monkeypatch.setattr(corrections, "completed", lambda picture, renders, *given: asked.append(renders) or ROUGH)
     monkeypatch.setattr(measure, "correction", lambda *given: _made(picture, sources=quiet))
     monkeypatch.setattr(measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
     found, told = corrections._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
@@ -643,14 +643,14 @@ def test_more_is_rendered_where_a_bias_is_not_known_well_enough(picture, u, belo
 
 def test_methods_that_are_judged_together_share_what_settles_them(picture, monkeypatch):
     """Both are doubtful at first, and when the whole picture is rendered; settled images are made once, tell both."""
-    fine, made = Images(ROUGH.renders, known={"settled": (np.zeros(1), np.zeros(1))}), []
+    fine, made = Images(ROUGH.renders, {"settled": csr_array((1, 4))}), []
     doubtful, sure = (
         _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])}) for u in (9.0, 0.1)
     )
     monkeypatch.setattr(proof, "completed", lambda *given: ROUGH)
     monkeypatch.setattr(corrections, "of_all", lambda *given: made.append("overall"))
     monkeypatch.setattr(corrections, "settled", lambda *given: made.append("settled") or fine)
-    monkeypatch.setattr(measure, "correction", lambda images, *given: sure if images.known else doubtful)
+    monkeypatch.setattr(measure, "correction", lambda images, *given: sure if images.changed else doubtful)
     renders = simulation.Renders("image", ("image",), ("other",))
     told = simulation.independent(picture, (Method("gradient"), Method("canny")), renders, (None, None))
     assert told == (sure, sure)

@@ -24,7 +24,7 @@ from measure.unevenness import Unevenness
 from render.build import MANY_WAYS
 from render.large import LARGE, LARGE_RANDOM
 from scenes import Picture, Scene
-from scenes.status import CLUTTER, ILL_CONDITIONED, MISFIT, OK, is_trusted
+from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, MISFIT, OK, SIGN_CHANGE, is_trusted
 from validation.remeasured import Method
 from validation.simulation.how import How, is_below
 from validation.simulation.images import completed, of_all, settled
@@ -60,22 +60,39 @@ def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simul
 
     Where two edges run together noise may decide which of them an edge point is on by one rule, and not by another:
     that a simulated picture tells, without an image. And a bias that is not known well enough for one may be for
-    another (`measure.other_estimators`): asked in images up to a megapixel alone, for each simulates all anew. What
-    ``made`` makes is a correction by one method.
+    another (`measure.other_estimators`), an edge be too faint for one alone: asked in images up to a megapixel. Where
+    each tells values that the other does not, each edge is measured by the one that tells it. What ``made`` makes is a
+    correction by one method.
     """
     found = made(picture, Method(measure.best_estimator(picture)))
     for name in measure.other_estimators(picture.scene):
-        if not _may_be_told(picture, found, measure.ESTIMATORS[name].local):
+        if not _may_be_told(picture, found, name):
             break
-        other = made(picture, Method(name))
-        found = other if _trusted(other) > _trusted(found) else found
+        tried = [found, made(picture, Method(name))]
+        mixed = _by_edges(picture, *tried)
+        if mixed is not None:
+            tried.append(made(picture, Method(mixed)))
+        found = max(tried, key=_trusted)  # the first of them
     return found
 
 
-def _may_be_told(picture: Picture, found: Correction, local: bool) -> bool:
+def _may_be_told(picture: Picture, found: Correction, name: str) -> bool:
     """Whether another estimator may tell more: one that looks where nothing is measured, too, takes long."""
-    unknown = CLUTTER in found.status and is_below(picture, LARGE)
-    return unknown or (local and ILL_CONDITIONED in found.simulated)
+    below, simulated, local = is_below(picture, LARGE), found.simulated, measure.ESTIMATORS[name].local
+    unknown, faint = CLUTTER in found.status and below, below and not {LOW_CONTRAST, SIGN_CHANGE}.isdisjoint(simulated)
+    return unknown or (local and (faint or ILL_CONDITIONED in simulated))
+
+
+def _by_edges(picture: Picture, found: Correction, other: Correction) -> str | None:
+    """The estimator that measures the edges of values that the other alone tells by that, the rest as before.
+
+    None where one of both tells all that the other does, or their edges cannot be measured one by one.
+    """
+    one, two = (np.array([is_trusted(state) for state in each.status]) for each in (found, other))
+    if not ((one & ~two).any() and (two & ~one).any()):
+        return None
+    names = {name for quantity, new in zip(found.quantities, two & ~one, strict=True) if new for name in quantity.edges}
+    return measure.mixed_estimator(found.estimator, other.estimator, names)
 
 
 def _trusted(found: Correction) -> int:
@@ -85,7 +102,8 @@ def _trusted(found: Correction) -> int:
 @lru_cache(maxsize=64)
 def _simulated(picture: Picture, method: Method, how: How) -> Correction:
     alike = picture.with_scene(_without_textures(picture.scene))
-    found, told = _until_quiet(alike, method, how)
+    shared = _shown(alike, how.shared(alike)) if is_below(alike, LARGE) else None  # large ones fill the memory
+    found, told = _until_quiet(alike, method, how, shared)
     if alike is picture or alike.scene == picture.scene:
         return found
     uneven = Unevenness.about(picture, told.response)
@@ -111,41 +129,67 @@ def _with_textures(picture: Picture, method: Method, how: How, states: tuple[str
     return tuple(MISFIT if new and old == OK else old for new, old in zip(misfit, states, strict=True))
 
 
-def _until_quiet(picture: Picture, method: Method, how: How) -> tuple[Correction, PropagatedValues]:
+class Shown:
+    """Noise-free images of a picture, each made when it is first asked for: estimators that read them share them.
+
+    ``first``: those that are there, with what the scene is not sure of.
+    """
+
+    def __init__(self, picture: Picture, how: How, first: Images | None = None) -> None:
+        self.picture, self.how, self._first = picture, how, first
+        self.image = cache(partial(how.image, picture))
+        self.rough = cache(partial(how.rough.image, picture))
+        self._overall = cache(lambda: of_all(picture, self._first, how))
+        self._settled = cache(lambda: settled(picture, self._first, how).changed)
+
+    def images(self, renders: tuple[np.ndarray, ...]) -> Images:
+        """Renders, with images of what the scene is not sure of: made beside the first that are asked for."""
+        if self._first is None:
+            self._first = completed(self.picture, renders, (), self.how)
+        return replace(self._first, renders=renders)
+
+    def more_telling(self, images: Images) -> list[Callable[[], Images]]:
+        """What tells of inputs that images do not know well enough, the quickest first."""
+        return [
+            lambda: replace(images, overall=self._overall()),
+            lambda: replace(images, changed=self._settled(), overall=self._overall()),
+        ]
+
+
+def _until_quiet(
+    picture: Picture, method: Method, how: How, shown: Shown | None = None
+) -> tuple[Correction, PropagatedValues]:
     """With few rays if these do; else with all, and with renders of other rays until they do, `_MOST` at most.
 
     Beside it what propagation says of the mean of the first of these renders.
     """
+    shown = shown or Shown(picture, how)
 
-    def propagated(renders: tuple[np.ndarray, ...]) -> PropagatedValues:
+    def begun(render: Callable[[int], np.ndarray], least: int) -> tuple[PropagatedValues, Callable, Images]:
+        renders = tuple(render(seed) for seed in range(least))
         clean = mean_of(renders)
-        return measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
+        told = measure.propagate(clean, picture, estimator=method.locator, threshold=method.threshold).measurands
+        return told, partial(told_by, picture, method, told), shown.images(renders)
 
-    images = None
     pair = how.by_pixel and not is_below(picture, LARGE_RANDOM)  # a small one has few pixels, and is cheap
     if how.active(picture) & MANY_WAYS:
-        few = tuple(how.rough.image(picture, seed) for seed in range(_PAIR if pair else _ROUGH))
-        images, told = completed(picture, few, (), how), propagated(few)
-        of = partial(told_by, picture, method, told)
+        told, of, images = begun(shown.rough, _PAIR if pair else _ROUGH)
         found = of(images)
-        if len(few) * _noise(found) ** 2 <= _MOST:
-            found, images = _quieter(picture, of, found, images, how.rough)
+        if len(images.renders) * _noise(found) ** 2 <= _MOST:
+            found, images = _quieter(of, found, images, shown.rough)
         if _noise(found) <= 1:
-            return sure(picture, found, of, more_telling(picture, images, how)), told
-    renders = tuple(how.image(picture, seed) for seed in range(_PAIR if pair else _LEAST))
-    images = replace(images, renders=renders) if images else completed(picture, renders, (), how)
-    told = propagated(renders)
-    of = partial(told_by, picture, method, told)
-    found, images = _quieter(picture, of, of(images), images, how)
-    return sure(picture, found, of, more_telling(picture, images, how)), told
+            return sure(picture, found, of, shown.more_telling(images)), told
+    told, of, images = begun(shown.image, _PAIR if pair else _LEAST)
+    found, images = _quieter(of, of(images), images, shown.image)
+    return sure(picture, found, of, shown.more_telling(images)), told
 
 
 def _quieter(
-    picture: Picture, of: Callable[[Images], Correction], found: Correction, images: Images, how: How
+    of: Callable[[Images], Correction], found: Correction, images: Images, render: Callable[[int], np.ndarray]
 ) -> tuple[Correction, Images]:
     """With renders of other rays until they are quiet, `_MOST` at most."""
     while _noise(found) > 1 and len(images.renders) < _MOST:
-        images = replace(images, renders=(*images.renders, how.image(picture, len(images.renders))))
+        images = replace(images, renders=(*images.renders, render(len(images.renders))))
         found = of(images)
     return found, images
 
@@ -166,21 +210,17 @@ def sure(
     return found
 
 
-def more_telling(picture: Picture, images: Images, how: How) -> list[Callable[[], Images]]:
-    """What tells of inputs that these images do not know well enough, the quickest first."""
-    overall = cache(partial(of_all, picture, images, how))
-    return [
-        lambda: replace(images, overall=overall()),
-        lambda: replace(settled(picture, images, how), overall=overall()),
-    ]
-
-
 def _noise(found: Correction) -> float:
     """Of the renderer, in parts of what it is to stay below, of the noisiest value."""
     tolerances = np.array([0.0 if q.tolerance is None else q.tolerance.half for q in found.quantities])
     noise, limit = found.sources[RENDERING], np.maximum(_QUIET * found.sigma, _OF_TOLERANCE * tolerances)
     known = np.isfinite(noise) & np.isfinite(found.sigma)
     return float((noise[known] / np.maximum(limit[known], np.finfo(float).tiny)).max(initial=0.0))
+
+
+@lru_cache(maxsize=1)
+def _shown(picture: Picture, how: How) -> Shown:
+    return Shown(picture, how)
 
 
 def _without_textures(scene: Scene) -> Scene:

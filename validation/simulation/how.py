@@ -8,6 +8,7 @@ import numpy as np
 
 import measure
 import render
+from imaging.light.appearance import is_plain
 from render import EffectTolerance, Quality
 from render import variant as variants
 from render.build import MANY_WAYS
@@ -48,6 +49,10 @@ class How:
             predicted=all(each.bias_predicted for each in kinds),
             readers=tuple(sorted({each.locator for each in methods})),
         )
+
+    def shared(self, picture: Picture) -> How:
+        """That of all estimators whose images are the same ones: where the image model draws none."""
+        return self if is_plain(picture.scene) else replace(self, predicted=False, readers=())
 
     @property
     def rough(self) -> How:

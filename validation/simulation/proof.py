@@ -17,7 +17,7 @@ from render.build import MANY_WAYS
 from render.large import near_required
 from scenes import Picture
 from validation.remeasured import Method
-from validation.simulation.corrections import more_telling, sure, told_by
+from validation.simulation.corrections import Shown, sure, told_by
 from validation.simulation.how import How
 from validation.simulation.images import completed
 
@@ -105,7 +105,7 @@ def independent(
     """
     how = how.by(*methods).gathering
     images = completed(picture, renders.others, renders.measured, how)
-    more, found = [cache(each) for each in more_telling(picture, images, how)], []
+    more, found = [cache(each) for each in Shown(picture, how, images).more_telling(images)], []
     for each, told in zip(methods, propagated, strict=True):
         of = partial(told_by, picture, each, told)
         found.append(sure(picture, of(images), of, more))
