@@ -59,6 +59,8 @@ class Measurements(Shown):
     forms : dict
         By name of each form (`scenes.measurands.form`) its points and their law in each image, in order
         (`measure.features.forms.FoundForm`); None where it is not found.
+    estimator : str
+        By which the straight edges are measured; empty where that is not told.
     """
 
     quantities: tuple[Quantity, ...]
@@ -77,6 +79,7 @@ class Measurements(Shown):
     u_bias: np.ndarray
     forms: dict[str, tuple[FoundForm | None, ...]] = field(default_factory=dict)
     u_placed: np.ndarray = field(default_factory=lambda: np.zeros(()))
+    estimator: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -224,12 +227,14 @@ def exposures_by(
     where few are measured."""
     stack, lead = images.reshape(-1, *images.shape[-2:]), images.shape[:-2]
     return tuple(
-        _gathered(find(stack, picture, *method), picture, saturated(stack, picture, method[0]), lead)
+        _gathered(find(stack, picture, *method), picture, method[0], saturated(stack, picture, method[0]), lead)
         for method in methods
     )
 
 
-def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray, lead: tuple[int, ...]) -> Measurements:
+def _gathered(
+    found: MeasuredFeatures, picture: Picture, estimator: str, saturation: np.ndarray, lead: tuple[int, ...]
+) -> Measurements:
     quantities = found.known.quantities
     count = len(quantities)
     measured = np.isin(found.status, status.MEASURED)
@@ -253,4 +258,5 @@ def _gathered(found: MeasuredFeatures, picture: Picture, saturation: np.ndarray,
         u_bias=np.full((*lead, count), np.nan),
         u_placed=np.sqrt(np.einsum("nmm->nm", found.placed)).reshape(*lead, count),
         forms={quantity.name: form.found for quantity, form in found.forms.items()},
+        estimator=estimator,
     )

@@ -13,6 +13,8 @@ from measure.quantities import find
 from scenes import InvalidInput, Picture, Pose
 from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, OK, SIGN_CHANGE
 from validation import simulation
+from validation.cli import measurands
+from validation.inspection import inspect
 from validation.remeasured import Method
 
 NEAR, FAR = (30, 135), (15, 315)
@@ -187,3 +189,18 @@ def test_estimators_of_pairs_of_names(task1):
     with pytest.raises(InvalidInput, match=r"estimator must be one of canny, .*, got 'sobel'"):
         measure.measure(image, picture, estimator="sobel, isophote at e4")
     assert measure.mixed_estimator("strip", "isophote", ["e4"]) is None
+
+
+def test_by_what_is_measured_is_said_where_it_is_not_the_default(task1):
+    picture = Picture.of(task1, NEAR, FAR)
+    image = planner.image(picture)
+    names = ("arrangement", "isophote", "gradient, isophote at e4")
+    found = [measure.measure(image, picture, estimator=name) for name in names]
+    assert [each.estimator for each in found] == list(names)
+    assert measurands.by_others(inspect(*found)) == [
+        f"Straight edges in picture {k} by {names[k - 1]}, which tells more of the values than arrangement does."
+        for k in (2, 3)
+    ]
+    (line,) = measurands.by_others(inspect(found[1]))
+    assert line.startswith("Straight edges by isophote, ")
+    assert {row["estimator"] for row in measurands.facts(inspect(found[2]))} == {names[2]}

@@ -130,6 +130,7 @@ def test_measured_values_and_their_decisions_are_printed():
         u=np.array([0.004, np.nan]), u_bias=np.array([0.0032, np.nan]), bias=np.array([0.011, 0.0]),
         covariance_image=np.array([[0.09, 0.0], [0.0, 0.16]]), nominal=np.array([10.0, 30.0]), units=("mm", "degrees"),
         value=np.array([10.08, 29.5]), value_image=np.array([812.0, 28.5]), status=np.array(["ok", "ok"]),
+        estimator="isophote",
     )  # fmt: skip
     rows = [SimpleNamespace(requirement=SimpleNamespace(U=U), decision=each, picture=1)
             for U, each in ((0.0131, "undecided"), (None, None))]  # fmt: skip
@@ -139,7 +140,7 @@ def test_measured_values_and_their_decisions_are_printed():
         "name": "slot", "kind": "width", "unit": "mm", "value": 10.08, "sigma": 0.0024, "value_image": 812.0,
         "bias": 0.011, "u_bias": 0.0032, "u": 0.004, "U": 0.0131,
         "sigma_image": pytest.approx(0.3), "nominal": 10.0, "tolerance": {"plus": 0.09, "minus": 0.02},
-        "decision": "undecided", "status": "ok",
+        "decision": "undecided", "status": "ok", "estimator": "isophote",
     }  # fmt: skip
     assert (two["value"], two["sigma"], two["sigma_image"], two["nominal"]) == (29.5, 0.5, pytest.approx(0.4), 30.0)
     assert (two["U"], two["decision"]) == (None, None)

@@ -43,6 +43,7 @@ def facts(inspected: Inspection) -> list[dict[str, Any]]:
             "U": row.requirement.U,
             "decision": row.decision,
             "status": state,
+            "estimator": found.estimator,
         } | _of_some(found, row, k, len(inspected.taken), good))  # fmt: skip
     return plain(rows)
 
@@ -84,6 +85,19 @@ def _reasons(rows: list[dict[str, Any]], found: measure.Measurements) -> list[st
 def _saturated(count: int) -> str:
     pixels = "1 pixel near the edges is" if count == 1 else f"{count} pixels near the edges are"
     return f"{pixels} at the end of the sensor's scale, not as in the simulation, whose bias is another one"
+
+
+def by_others(inspected: Inspection) -> list[str]:
+    """A line for each picture whose straight edges are measured by another estimator than the default one."""
+    from measure import best_estimator
+
+    told = [(found.estimator, best_estimator(found.picture)) for found in (each.found for each in inspected.taken)]
+    of = [f" in picture {number}" for number in range(1, len(told) + 1)] if len(told) > 1 else [""]
+    return [
+        f"Straight edges{where} by {name}, which tells more of the values than {default} does."
+        for where, (name, default) in zip(of, told, strict=True)
+        if name != default
+    ]
 
 
 def covariance(inspected: Inspection) -> list[list[float | None]]:

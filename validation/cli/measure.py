@@ -289,6 +289,8 @@ def _say_measurands(
         shown.print(measurands.table(rows, zones))
         for line in legend([row["status"] for row in rows], measurands.reasons(rows, inspected)):
             shown.print(f" {line}", highlight=False)
+        for line in [] if given.estimator else measurands.by_others(inspected):
+            shown.print(line, highlight=False)
         for each in places:
             shown.print(placement.text(each), highlight=False)
         if distance is not None:
