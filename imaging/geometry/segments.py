@@ -1,8 +1,10 @@
-"""Pixels beside a segment of a line, and their numbers among themselves."""
+"""Places and pixels beside segments of lines, and these pixels' numbers among themselves."""
 
 from __future__ import annotations
 
 import numpy as np
+
+_ROUNDING = 1e-6  # px
 
 
 def distance_to_segment(points: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
@@ -10,6 +12,25 @@ def distance_to_segment(points: np.ndarray, start: np.ndarray, stop: np.ndarray)
     along = stop - start
     fraction = np.clip((points - start) @ along / max(float(along @ along), np.finfo(float).tiny), 0, 1)
     return np.linalg.norm(points - start - fraction[..., None] * along, axis=-1)
+
+
+def within_reach(segments: np.ndarray, points: np.ndarray, reach: float) -> np.ndarray:
+    """Segments (k, 2, 2) of some, (n, 2, 2), all that come within ``reach`` of one of the points (P, 2), and some more:
+    those whose box comes so near to that of the points.
+
+    >>> within_reach(np.array([[[0.0, 0.0], [1.0, 0.0]], [[5.0, 0.0], [9.0, 0.0]]]), np.array([[3.0, 1.0]]), 2.5)
+    array([[[0., 0.],
+            [1., 0.]],
+    <BLANKLINE>
+           [[5., 0.],
+            [9., 0.]]])
+    >>> within_reach(np.array([[[0.0, 0.0], [1.0, 0.0]], [[5.0, 0.0], [9.0, 0.0]]]), np.array([[3.0, 1.0]]), 1.5).size
+    0
+    """
+    if not (points.size and segments.size):
+        return segments[:0]
+    low, high = points.min(0) - reach - _ROUNDING, points.max(0) + reach + _ROUNDING
+    return segments[((segments.max(1) >= low) & (segments.min(1) <= high)).all(1)]
 
 
 def pixels_along(
@@ -22,7 +43,7 @@ def pixels_along(
     >>> [part.tolist() for part in pixels_along(np.array([1.0, 1.0]), np.array([4.0, 4.0]), 0.5, (6, 9))]
     [[1, 2, 3, 4], [1, 2, 3, 4]]
     """
-    reach = reach + 1e-6
+    reach = reach + _ROUNDING
     size = np.array(shape[::-1])
     low = np.clip(np.ceil(np.minimum(start, stop) - reach), 0, size).astype(int)
     high = np.clip(np.floor(np.maximum(start, stop) + reach), -1, size - 1).astype(int)

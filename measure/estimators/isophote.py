@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imaging.features.locator import CLEARANCE, MIN_CONTRAST, edge_blur, isophote_kappa2, kappa2
-from imaging.geometry.segments import distance_to_segment
+from imaging.geometry.segments import distance_to_segment, within_reach
 from measure.estimators.beside import SideLevel, misled
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, reached
 from measure.estimators.kinds import EstimatorKind
@@ -95,7 +95,8 @@ def _side(layout: Layout, index: int, caliper: Caliper, sign: int) -> _Level:
     even = not layout.optics.dimmed if face == BACKGROUND else layout.shadings[face] is not None
     flat, points, along, across = pixels_beside(caliper, _BAND * start if even else max(HALF_WIDTH, _BAND * start))
     clearance = sign * across
-    for segment in (*layout.ends[layout.visible], *layout.others):
+    edges = np.concatenate([layout.ends[layout.visible], layout.others])
+    for segment in within_reach(edges, points, float(clearance.max(initial=0.0))):
         if not np.array_equal(segment, layout.ends[index]):
             clearance = np.minimum(clearance, distance_to_segment(points, *segment))
     own = (layout.face_at(flat) == face) & (clearance > 0)

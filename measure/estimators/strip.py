@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from imaging.features.locator import CLEARANCE, edge_blur
-from imaging.geometry.segments import distance_to_segment, pixels_along
+from imaging.geometry.segments import distance_to_segment, pixels_along, within_reach
 from measure.estimators.beside import SideLevel, misled
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.kinds import EstimatorKind
@@ -83,7 +83,7 @@ def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[
     # an edge may be required twice, once for each of its corners
     task = [ends for ends in layout.ends[layout.visible] if not np.array_equal(ends, layout.ends[index])]
     apart = {segment.tobytes() for segment in layout.apart[index]}
-    for segment in (*task, *layout.others):
+    for segment in within_reach(np.concatenate([np.reshape(task, (-1, 2, 2)), layout.others]), points, clear):
         away = distance_to_segment(points[keep], *segment)
         crowded = segment.tobytes() in apart  # too near all along: nothing would be left, so it is flagged instead
         keep[keep] = (away > clear) | (crowded & (away > NEARER * np.abs(across[keep])))

@@ -174,9 +174,13 @@ class Layout:
         """Which face each of some pixels (flat indices, (P,)) belongs to, int, (P,)."""
         points = np.stack(np.divmod(pixels, self.optics.shape[1])[::-1], 1).astype(float)
         found = np.full(len(points), BACKGROUND)
+        first, last = points.min(0, initial=np.inf), points.max(0, initial=-np.inf)
         for index, face in enumerate(self.faces):
             corners = self.optics.recorded(face)
-            near = np.flatnonzero(((points >= corners.min(0)) & (points <= corners.max(0))).all(1))
+            low, high = corners.min(0), corners.max(0)
+            if (low > last).any() or (high < first).any():
+                continue
+            near = np.flatnonzero(((points >= low) & (points <= high)).all(1))
             if near.size:
                 found[near[points_in_poly(points[near], corners)]] = index
         return found

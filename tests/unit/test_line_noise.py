@@ -1,5 +1,7 @@
 """Lines that noise has looked for from elsewhere: whether their errors are those that their derivative tells."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -7,6 +9,10 @@ from scipy import sparse
 import measure
 import render
 import scenes
+from imaging.geometry.segments import within_reach
+from measure.estimators import isophote, strip
+from measure.estimators.registry import estimator
+from measure.features import line_noise
 from measure.features.layout import layout_of, polygon_layout
 from measure.features.line_noise import torn
 from measure.features.optics import Optics
@@ -56,6 +62,46 @@ def test_a_line_that_lies_elsewhere_from_elsewhere_is_not_as_told():
     assert ratio < 0.8  # margin: 0.63
     assert called
     assert not others.any()
+
+
+@pytest.mark.parametrize(("jumping", "images", "called"), [(3, 16, 4), (2, 128, 2)])
+def test_where_most_lines_jump_no_more_images_are_drawn(jumping, images, called, monkeypatch):
+    """All count as such then; of half of them each is told by all that are drawn."""
+    layout, image = polygon_layout(CORNERS, Optics(SHAPE, blur_px=0.7, noise_variance=NOISE**2)), picture(0.4375)
+    response, asked = np.zeros((8, image.size)), []
+
+    def offsets(images, *given):
+        asked.append(len(images))
+        return np.zeros((len(images), 4, 2)), np.ones((len(images), 4), bool)
+
+    monkeypatch.setattr(line_noise, "_offsets", offsets)
+    edges = itertools.cycle(range(4))
+    monkeypatch.setattr(line_noise, "is_linear", lambda *edge: next(edges) >= jumping)
+    assert torn(image, layout, "isophote", 1.0, sparse.csr_array(response)).sum() == called
+    assert sum(asked) == 1 + images
+
+
+@pytest.mark.parametrize("name", ["isophote", "strip"])
+def test_edges_out_of_reach_change_nothing(name, monkeypatch):
+    """Whether they are asked for their distance or not: pixels and what these do to the lines."""
+    bracket = scenes.load("bracket")
+    layout = layout_of(scenes.Picture.of(bracket, bracket.settings[0].sensor, bracket.settings[0].light))
+    image, asked = np.random.default_rng(2).uniform(50, 200, layout.optics.shape), []
+
+    def all_of(segments, points, reach):
+        asked.append(len(segments) - len(within_reach(segments, points, reach)))
+        return segments
+
+    near = estimator(layout, name)
+    for module in (isophote, strip):
+        monkeypatch.setattr(module, "within_reach", all_of)
+    every = estimator(layout, name)
+    assert (near.pixels == every.pixels).all()
+    assert (
+        np.nan_to_num(near.estimate(image[None]).level).tolist()
+        == np.nan_to_num(every.estimate(image[None]).level).tolist()
+    )
+    assert sum(asked) > 20  # margin: that there are such edges
 
 
 @pytest.mark.render
