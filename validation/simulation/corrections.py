@@ -69,7 +69,7 @@ def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simul
         if not _may_be_told(picture, found, name):
             break
         tried = [found, made(picture, Method(name))]
-        mixed = _by_edges(picture, *tried)
+        mixed = _by_edges(*tried)
         if mixed is not None:
             tried.append(made(picture, Method(mixed)))
         found = max(tried, key=_trusted)  # the first of them
@@ -78,12 +78,12 @@ def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simul
 
 def _may_be_told(picture: Picture, found: Correction, name: str) -> bool:
     """Whether another estimator may tell more: one that looks where nothing is measured, too, takes long."""
-    below, simulated, local = is_below(picture, LARGE), found.simulated, measure.ESTIMATORS[name].local
-    unknown, faint = CLUTTER in found.status and below, below and not {LOW_CONTRAST, SIGN_CHANGE}.isdisjoint(simulated)
-    return unknown or (local and (faint or ILL_CONDITIONED in simulated))
+    states = {ILL_CONDITIONED} | ({LOW_CONTRAST, SIGN_CHANGE} if is_below(picture, LARGE) else set())
+    unknown, unseen = CLUTTER in found.status and is_below(picture, LARGE), not states.isdisjoint(found.simulated)
+    return unknown or (unseen and measure.ESTIMATORS[name].local)
 
 
-def _by_edges(picture: Picture, found: Correction, other: Correction) -> str | None:
+def _by_edges(found: Correction, other: Correction) -> str | None:
     """The estimator that measures the edges of values that the other alone tells by that, the rest as before.
 
     None where one of both tells all that the other does, or their edges cannot be measured one by one.
