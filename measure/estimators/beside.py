@@ -1,8 +1,9 @@
 """Whether the levels that pixels beside an edge tell are those at the edge, as far as the scene knows.
 
-An estimator of single edges takes each side for a level that changes linearly. In a scene where more is seen than lit
-faces of one convex body before darkness that may be wrong: a shadow on the floor, light from a wall, an obstacle. The
-scene's own levels at the same pixels (`measure.features.looks`) tell by how much, and what that moves the edge by.
+An estimator of single edges takes each side for a level that changes as its face is lit. That may be wrong: a print,
+the end of the sensor's scale; and where more is seen than faces of one convex body before darkness a shadow on the
+floor, light from a wall, an obstacle. The scene's own levels at the same pixels (`measure.features.looks`) tell by how
+much, and what that moves the edge by.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ class SideLevel(NamedTuple):
 def misled(layout: Layout, index: int, caliper: Caliper, sides: tuple[SideLevel, SideLevel], scale_px: float) -> bool:
     """Whether an edge is found elsewhere than it is, by more than what is negligible beside its noise at best.
 
-    Never where the layout does not know what the scene shows; and what disturbs the classic locators disturbs others
-    there, too.
+    Never where the layout does not know what the scene shows. What disturbs the classic locators disturbs others, too,
+    where things hide or shade each other.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def misled(layout: Layout, index: int, caliper: Caliper, sides: tuple[SideLevel,
     """
     if layout.looks is None:
         return False
-    if layout.clutter is not None and layout.clutter[index]:
+    if layout.arrangement is None and layout.clutter is not None and layout.clutter[index]:
         return True
     moved, contrast, noise = displacement(layout, layout.looks, caliper, sides, scale_px)
     blur, length = float(np.mean(caliper.blur(caliper.positions))), float(np.ptp(caliper.positions))

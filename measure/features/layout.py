@@ -7,15 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from skimage.measure import points_in_poly
 
-from imaging.blurred.arrangement import Arrangement, arrangement_of, faces_beside, polygon_arrangement
+from imaging.blurred.arrangement import Arrangement, arrangement_of, faces_beside, polygon_arrangement, spread
 from imaging.features.projected_edges import corner_features, projected_edges, straight
 from imaging.geometry.blur import signed_confusion
 from imaging.geometry.projection import depth, facing, project_ideal
 from imaging.geometry.visibility import boundaries
-from imaging.light.appearance import is_plain
+from imaging.light.appearance import face_signal, is_plain
+from imaging.light.sheets import printed
 from imaging.models.bias import cluttered
 from imaging.models.strong import strong_pieces
 from imaging.pictures import Pictures
+from imaging.sensor import headroom
 from measure.estimators.shading import Shading, face_shadings
 from measure.features.looks import Looks
 from measure.features.optics import Optics
@@ -63,7 +65,7 @@ class Layout:
     strong : ndarray, shape (E, 2), optional
         Where the light is known, the piece of each edge that stands out of the noise, as fractions of its length.
     looks : Looks, optional
-        The levels that the scene shows, where the light is known and things hide or shade each other.
+        The levels that the scene shows, where the light is known and they may be others than faces' shadings say.
     """
 
     names: tuple[str, ...]
@@ -233,8 +235,19 @@ def _layout(picture: Picture, pictures: Pictures) -> Layout:
         arrangement=arrangement_of(pictures) if is_plain(scene) else None,
         clutter=cluttered(pictures) if picture.lights else None,
         strong=strong_pieces(pictures, view) if picture.lights else None,
-        looks=Looks.of(pictures) if picture.lights and not is_plain(scene) else None,
+        looks=Looks.of(pictures) if picture.lights and _is_uneven(pictures, seen) else None,
     )
+
+
+def _is_uneven(pictures: Pictures, seen: np.ndarray) -> bool:
+    """Whether a level beside an edge may be another than its face's shading says: by what is seen behind, by what is
+    printed, or by the end of the sensor's scale; ``seen``: the faces that are, (F,)."""
+    scene, bodies = pictures.scene, pictures.scene.bodies
+    if printed(scene) or not is_plain(scene):
+        return True
+    most = headroom(scene.noise)
+    corners = ((face, spread(bodies.vertices[list(bodies.faces[face])])) for face in np.flatnonzero(seen).tolist())
+    return any(face_signal(pictures, points, face, 1).max() > most for face, points in corners)
 
 
 def polygon_layout(corners: np.ndarray, optics: Optics) -> Layout:

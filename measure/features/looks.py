@@ -1,7 +1,8 @@
 """Levels that the scene shows beside edges, where more than the part's own lit faces may be seen there.
 
-Faces that get light from other faces alone, a floor, shadows upon it, obstacles: what an estimator takes for even may
-be none of it. Rays of the camera tell, as a pinhole sees it: levels, with shadows and with light between surfaces.
+Faces that get light from other faces alone, prints, a floor, shadows upon it, obstacles: what an estimator takes for
+even may be none of it. Rays of the camera tell, as a pinhole sees it: levels, with shadows and with light between
+surfaces.
 """
 
 from __future__ import annotations
