@@ -183,8 +183,7 @@ def varied(
     images: Annotated[int, typer.Option(help="Noisy pictures of each.")] = 40,
     seed: Annotated[int, typer.Option()] = 1,
 ) -> None:
-    """Random scenes with several things at once, by every estimator: no value is ok and wrong; hours, most of them for glossy
-    and polarised surfaces under lights of some size."""
+    """Random scenes with several things at once, by every estimator: no value is ok and wrong; many hours."""
     rows: list[Row] = []
     for number in range(count):
         rng = np.random.default_rng([seed, number])
