@@ -35,7 +35,8 @@ def test_only_what_is_measured_has_a_value(lead, task1, rng, monkeypatch):
     monkeypatch.setattr(measurands, "of_first", lambda *given: (first, *given))
     picture = SimpleNamespace(scene=task1)
     saturated = np.arange(images) + 3
-    told = measurands._gathered(found, picture, saturated, lead)
+    told = measurands._gathered(found, picture, "strip", saturated, lead)
+    assert told.estimator == "strip"
     assert told.saturated.tolist() == saturated.reshape(lead).tolist()
     assert told.u_bias.shape == (*lead, 3)
     assert (told.u_placed**2).ravel() == pytest.approx(found.placed[:, range(3), range(3)].ravel())
