@@ -21,13 +21,14 @@ from scenes import status
 
 _RARE = 1e-7  # probability below which no image is looked at from elsewhere
 _MOST_PIXELS = 1 << 23  # of drawn images at a time, 64 MiB
+_LITTLE = 1.0  # px
 
 
 def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float, response: sparse.csr_array) -> np.ndarray:
     """Of which edges the errors are others than a derivative tells, bool (E,).
 
     Asked only where some edge of the noise-free image lies about as far from its expected place as the estimator
-    reaches, or farther. Where most do in the first drawn images, all count as such, and no more are asked.
+    reaches, or farther. Where most do in the first drawn images by one that reaches little, all count as such.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float, respons
             offsets, measured = _offsets(images[start : start + some].whole(clean.shape), layout, name, threshold)
             full.append(offsets - here)
             found.append(measured)
-        if len(linear) == 1 and _most(jumps := _jumping(linear, full, found)):
+        if len(linear) == 1 and _is_dear(name) and _most(jumps := _jumping(linear, full, found)):
             return np.ones_like(jumps)
     return _jumping(linear, full, found)
 
@@ -62,8 +63,14 @@ def _jumping(linear: list[np.ndarray], full: list[np.ndarray], found: list[np.nd
     return np.array([not is_linear(*edge) for edge in zip(*columns, strict=True)])
 
 
+def _is_dear(name: str) -> bool:
+    """Whether an estimator reaches so little that most images would be looked at from places of their own; not one of
+    two, which is asked where each of them has told something."""
+    return name in ESTIMATORS and ESTIMATORS[name].capture_px < _LITTLE
+
+
 def _most(jumps: np.ndarray) -> bool:
-    """Whether most edges jump: all are looked for together, from elsewhere in each image, which takes long."""
+    """Whether most edges jump."""
     return bool(2 * jumps.sum() > jumps.size)
 
 

@@ -64,9 +64,12 @@ def test_a_line_that_lies_elsewhere_from_elsewhere_is_not_as_told():
     assert not others.any()
 
 
-@pytest.mark.parametrize(("jumping", "images", "called"), [(3, 16, 4), (2, 128, 2)])
-def test_where_most_lines_jump_no_more_images_are_drawn(jumping, images, called, monkeypatch):
-    """All count as such then; of half of them each is told by all that are drawn."""
+@pytest.mark.parametrize(
+    ("name", "jumping", "images", "called"),
+    [("isophote", 3, 16, 4), ("isophote", 2, 128, 2), ("gradient", 3, 128, 3), ("gradient, isophote at s1", 3, 128, 3)],
+)
+def test_where_most_isophotes_jump_no_more_images_are_drawn(name, jumping, images, called, monkeypatch):
+    """All count as such then; of half of them, and by others, each is told by all that are drawn."""
     layout, image = polygon_layout(CORNERS, Optics(SHAPE, blur_px=0.7, noise_variance=NOISE**2)), picture(0.4375)
     response, asked = np.zeros((8, image.size)), []
 
@@ -77,7 +80,8 @@ def test_where_most_lines_jump_no_more_images_are_drawn(jumping, images, called,
     monkeypatch.setattr(line_noise, "_offsets", offsets)
     edges = itertools.cycle(range(4))
     monkeypatch.setattr(line_noise, "is_linear", lambda *edge: next(edges) >= jumping)
-    assert torn(image, layout, "isophote", 1.0, sparse.csr_array(response)).sum() == called
+    monkeypatch.setattr(line_noise, "_is_doubtful", lambda *given: True)
+    assert torn(image, layout, name, 1.0, sparse.csr_array(response)).sum() == called
     assert sum(asked) == 1 + images
 
 
