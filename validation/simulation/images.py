@@ -86,8 +86,9 @@ def completed(
 
 
 def _read(picture: Picture, how: How) -> np.ndarray | None:
-    """The pixels that are read of an image, as a mask; None where it is not known by what."""
-    return measure.region_of_interest(picture, estimators=how.readers) if how.readers else None
+    """The pixels that are read of a drawn image, as a mask; None where it is not known by what, or none is drawn."""
+    known = how.readers and is_drawable(picture.scene)
+    return measure.region_of_interest(picture, estimators=how.readers) if known else None
 
 
 def _is_drawn(picture: Picture, render: np.ndarray, drawing: Callable[[Picture], np.ndarray]) -> bool:
