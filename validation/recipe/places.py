@@ -74,7 +74,7 @@ class Places:
     def profiles(self, levels: np.ndarray) -> list[np.ndarray]:
         """The function, (t, M) of each band, of the grey levels (P,) of all pixels."""
         own = levels.take(self.near)
-        return [np.einsum("mtw,mw->tm", weights, own[:, columns]) for columns, weights in self.bands]
+        return [np.vecdot(weights, own[:, None, columns]).T for columns, weights in self.bands]
 
     @cached_property
     def used(self) -> np.ndarray:
