@@ -8,7 +8,7 @@ import pytest
 from planner.uncertainty import Input, budget, monte_carlo, validate
 from planner.uncertainty.validation import _reasons
 from scenes import Pose
-from validation.batch.repeated import RepeatedValues
+from validation.batch.repeated import STATUSES, RepeatedValues
 from validation.batch.rows import Rows
 
 MODEL = {"paper": 2.0, "calibrated": 3.0, "bound": 1.5, "value_px": 80.0, "predicted_bias": 0.25}
@@ -112,3 +112,17 @@ def test_reasons_are_told_from_their_limits_on():
     assert reasons(u=gum.u - 0.051, spread=(0, 0.018, 0, 0)) == plain
     assert reasons(failed=100) == ["100 of 1000 draws gave no value"]
     assert validate(gum, monte_carlo(lambda x: 200 * x["x"], inputs, 1)).verdict == "agree"
+
+
+def test_statuses_of_many_settings_ask_for_each_number_once(made):
+    """Of a million settings each asking takes milliseconds, and images are lost from ten thousand."""
+    rows, asked = made[0], []
+    short = rows._failures.index({"short": 3})
+    columns = {"clean": np.full(9, STATUSES.index("ok")), "failures": np.full(9, short), "n": np.full(9, 40)}
+
+    def numbers(name):
+        asked.append(name)
+        return columns[name]
+
+    assert rows._statuses(numbers).tolist() == ["short"] * 9
+    assert sorted(asked) == sorted(columns)

@@ -203,11 +203,10 @@ class Rows(Sequence[Row]):
 
     def _statuses(self, numbers: Callable[[str], np.ndarray]) -> np.ndarray:
         """Of one method's rows: `row_status`, asked only where images are lost from a picture that is ``ok``."""
-        found = np.array(STATUSES, object)[numbers("clean")]
-        stray = np.array([sum(failures.values()) for failures in self._failures])[numbers("failures")]
-        lost = is_trusted(found) & (stray > statistics.STRAY * numbers("n"))
-        for row in np.flatnonzero(lost):
-            found[row] = row_status(found[row], self._failures[numbers("failures")[row]], int(numbers("n")[row]))
+        found, which, count = np.array(STATUSES, object)[numbers("clean")], numbers("failures"), numbers("n")
+        stray = np.array([sum(failures.values()) for failures in self._failures])[which]
+        for row in np.flatnonzero(is_trusted(found) & (stray > statistics.STRAY * count)):
+            found[row] = row_status(found[row], self._failures[which[row]], int(count[row]))
         return found
 
     @property
