@@ -90,9 +90,9 @@ class Exposer:
         pictures = self._room(count) if again else self._filled(count)
         key = rng.integers(2**64, size=2, dtype=np.uint64)
         rows, columns = _shared(self.noise, key, count, self._steady.shape)
+        streams = _Streams(key)
         for index, tile in self._tiles:
-            stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, index]))
-            block = stream.standard_normal((count, *self._steady[tile].shape))
+            block = streams[0, index].standard_normal((count, *self._steady[tile].shape))
             block *= self._sigma[tile]
             block += self._steady[tile]
             if self.noise.is_shared:
@@ -113,6 +113,19 @@ class Exposer:
         return pictures
 
 
+class _Streams:
+    """Streams of one key by two numbers, one at a time: to place one takes a tenth of the time of making one."""
+
+    def __init__(self, key: np.ndarray) -> None:
+        self._bits = np.random.Philox(key=key)
+        self._start = self._bits.state
+
+    def __getitem__(self, numbers: tuple[int, int]) -> np.random.Generator:
+        self._start["state"]["counter"] = np.array([0, 0, *numbers], np.uint64)
+        self._bits.state = self._start
+        return np.random.Generator(self._bits)
+
+
 def _tiles(shape: tuple[int, int], where: np.ndarray | None) -> Iterator[tuple[int, tuple[slice, slice]]]:
     """Numbers and places of the tiles in which a pixel is wanted."""
     height, width = shape
@@ -126,7 +139,7 @@ def _tiles(shape: tuple[int, int], where: np.ndarray | None) -> Iterator[tuple[i
 
 def _shared(noise: Noise, key: np.ndarray, count: int, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     """What rows (count, height) and columns (count, width) have in common, grey levels, from a stream of its own."""
-    stream = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 1, 0]))
+    stream = _Streams(key)[1, 0]
     rows, columns = (stream.standard_normal((count, size)) if noise.is_shared else np.zeros((0, 0)) for size in shape)
     return noise.row_sigma * rows, noise.column_sigma * columns
 
