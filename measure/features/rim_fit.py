@@ -25,6 +25,7 @@ _PASSES = 3  # what is beside the first order is hundredths of a px, and changes
 _EXPECTED = 0.5  # of the share of its expected contrast that a place in the middle shows
 _MIN_FOUND = 0.7  # part of the places taken at which a point must be found
 _MIN_NEAR = 0.4  # the same, for the circle to be looked for where they say
+_STRAY = 1.0  # px from the circle through all places at which a crossing is of another edge
 _WINDOW = np.ones(5)  # places over which a contrast is averaged before an error is told from it
 
 
@@ -98,15 +99,21 @@ class RimFit:
 
     def fitted(self, points: EachPoint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Least-squares maps (n, p, m), errors (n, p) and the places (n, m) that they are from: of a circle about where
-        it is expected those that show what is expected of them."""
-        fit = self.fit(points.valid)
-        errors = self.solve(fit, points.offset)
+        it is expected those that show what is expected of them, and lie on it."""
+        fit, errors = self._through(points, points.valid)
         near = ~self.is_far(errors)[:, None]
         used = np.where(near, self.as_expected(points.valid, points.contrast), points.valid)
         if not np.array_equal(used, points.valid):
-            fit = self.fit(used)
-            errors = self.solve(fit, points.offset)
+            fit, errors = self._through(points, used)
+        stray = used & near & self.are_stray(points.offset, errors)
+        if stray.any():
+            used &= ~stray
+            fit, errors = self._through(points, used)
         return fit, errors, used
+
+    def _through(self, points: EachPoint, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        fit = self.fit(used)
+        return fit, self.solve(fit, points.offset)
 
     def is_far(self, errors: np.ndarray) -> np.ndarray:
         """Whether circles with errors (n, p) are farther from the expected one than the locator captures, bool (n,)."""
@@ -140,6 +147,16 @@ class RimFit:
         share = np.where(taken, contrast / self._told, np.nan)
         middle = np.array([_median(row[each]) for row, each in zip(share, taken, strict=True)])
         return valid & ~(share < _EXPECTED * middle[:, None])
+
+    def are_stray(self, offset: np.ndarray, errors: np.ndarray) -> np.ndarray:
+        """Which crossings, by their offsets (n, m), are not of the circle with errors (n, p), bool (n, m).
+
+        Where a shadow ends on a rim, its own crossing may be gone, in some noisy images alone, and that of the shadow's
+        border be found, some px away. None is where the light is not known: what moves all of one side may be another.
+        """
+        if self.contrast is None:
+            return np.zeros(offset.shape, bool)
+        return np.abs(offset + self.inward - errors @ self.design.T) > _STRAY
 
     def solve(self, fit: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """The parameters (n, p) by a least-squares map (n, p, m) from offsets (n, m) of the crossings, ideal px.

@@ -12,6 +12,7 @@ from imaging.features import limb_look, rim_look, rim_sides
 from imaging.features.rim_look import RimLook
 from imaging.features.rim_outline import _crossed, zero_of_steps
 from imaging.pictures import Pictures
+from measure.features.points import EachPoint
 from measure.features.rim_fit import RimFit, _median
 from scenes import Circle
 from scenes.viewpoint import Viewpoint
@@ -228,3 +229,20 @@ def test_places_that_show_less_than_half_their_contrast_are_left_out_whatever_th
     assert tool.as_expected(valid, shown).tolist() == (valid & np.stack([clear, clear, valid[2]])).tolist()
     assert tool.as_expected(np.zeros((1, 7), bool), shown[:1]).tolist() == [[False] * 7]
     assert replace(tool, contrast=None).as_expected(valid, shown).tolist() == valid.tolist()
+
+
+def test_crossings_far_from_the_circle_through_all_are_left_out_where_the_light_is_known():
+    """Of the border of a shadow, where the rim's own is gone; of a light that is not known all count."""
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    design = 10 * np.stack([np.cos(angle), np.sin(angle), np.ones(60)], 1)
+    tool = RimFit(design, np.ones(60), np.zeros(60), "ok", None, contrast=np.full(60, 40.0))
+    offset = np.stack([design @ [0.01, -0.02, 0.03], np.zeros(60)])
+    offset[0, 7] += 2.5
+    points = EachPoint(offset, np.ones((2, 60), bool), np.full((2, 60), 40.0))
+    fit, errors, used = tool.fitted(points)
+    assert used.tolist() == [[k != 7 for k in range(60)], [True] * 60]
+    assert errors == pytest.approx(np.array([[0.01, -0.02, 0.03], [0.0, 0.0, 0.0]]), abs=1e-12)
+    assert not fit[0, :, 7].any()
+    pulled = replace(tool, contrast=None).fitted(points)
+    assert pulled[2].all()
+    assert abs(pulled[1][0, 2] - 0.03) > 1e-3
