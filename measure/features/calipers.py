@@ -121,9 +121,8 @@ def _caliper(layout: Layout, i: int, clear: float, margin: float, crowd: float |
     elif inside.sum() < MIN_POSITIONS:
         state = status.NOT_VISIBLE
     else:
-        crowded = _crowded(layout, i, places[inside], clear if crowd is None else crowd)
-        if crowd is None and layout.clutter is not None:
-            crowded = layout.clutter[i]
+        told = crowd is None and layout.clutter is not None
+        crowded = layout.clutter[i] if told else _crowded(layout, i, places[inside], clear if crowd is None else crowd)
         state = status.CLUTTER if crowded else status.OK
     return Caliper(layout.names[i], start, along, length, positions[inside], state, layout.optics, layout.defocus[i])
 
