@@ -49,12 +49,13 @@ def behind(
     hit = points + np.where(face >= 0, t, 0.0)[..., None] * vectors
     lit = tuple(_where(wanted & (face >= 0), hit, face, e.at, partial(reaches, bodies)) for e in pictures.emitters)
     found = face_signal(pictures, hit, face, 1, lit, fall_off=fall_off)
-    found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
     if scene.bright_floor is not None:
         place, ahead = _on_floor(scene.bright_floor, points, vectors, t)
         place = place + _LIFT * scene.solid.extent * (0 if outward is None else outward * (1, 1, 0))
         on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
         found, t = np.where(ahead, on_floor, found), np.where(ahead, 0.0, t)
+        hit, face = np.where(ahead[..., None], place, hit), np.where(ahead, len(bodies.faces), face)
+    found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
     for which in backlights(scene):
         shown = backlit(pictures, which, points, vectors, analyser_axis(scene, pictures.sensors))
         found = np.where(np.isinf(t), found + shown, found)

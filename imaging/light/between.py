@@ -13,7 +13,7 @@ from imaging.light.exchanged import Exchanged, exchanged, once_reflected
 from imaging.light.illumination import dimming_of_one
 from imaging.light.irradiance import beam
 from imaging.pictures import Pictures
-from scenes import Scene, Solid
+from scenes import Material, Scene, Solid
 from scenes.lights import GLANCE
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray | float:
     """Signal that points (..., 3) on faces (...) of the bodies have from other faces, and from the floor.
 
-    Diffuse light alone; 0 on round walls that are measured as such, whose limbs have a model of their own, and in
-    pictures that are not looked at closely.
+    On the floor, too, whose number is that after the last of the faces. Diffuse light alone; 0 on round walls that are
+    measured as such, whose limbs have a model of their own, and in pictures that are not looked at closely.
     """
     scene = pictures.scene
     round_walls = [face for each in scene.solid.curved for face in each.faces]
@@ -44,7 +44,9 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
         found[others] = lent.at(points[others], faces[others])
     analysed = scene.camera.analyser_deg is not None
     white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
-    found = scene.camera.exposure * white[scene.surfaces.kinds[faces]] * np.where(asked, found, 0.0)
+    below = Material(diffuse_reflectance=0.0 if scene.bright_floor is None else scene.bright_floor.reflectance)
+    white = np.append(white[scene.surfaces.kinds], below.diffuse(analysed))
+    found = scene.camera.exposure * white[faces] * np.where(asked, found, 0.0)
     return found * dimming_of_one(pictures, points)
 
 
