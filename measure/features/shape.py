@@ -24,8 +24,8 @@ from scenes import status
 
 _GRID = 0.125  # px to which a new expectation is rounded, so that images can share it
 _PASSES = 6
-_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache; fewer of more than ...
-_MOST_PIXELS = 1 << 23  # ... pixels, 64 MiB, for where edges are sought anew images are copied, pass by pass
+_BATCH = 50  # images measured at a time: what they need then stays in the processor's cache
+_COPIED = 1 << 23  # pixels, 64 MiB, of images that are copied at a time where edges are sought anew, pass by pass
 _KEPT = 64  # estimators
 _TOOLS: OrderedDict[tuple[int, str, float], Estimator | ArrangementEstimator] = OrderedDict()
 _LOST = 0.75  # px from the expected edge beyond which the whole layout is sought anew
@@ -65,8 +65,7 @@ def find_shape(images: np.ndarray, layout: Layout, name: str, threshold: float =
     tool = prepared(layout, name, threshold)
     if isinstance(tool, ArrangementEstimator):
         return find_arranged(images, layout, tool)
-    size = min(_BATCH, max(_MOST_PIXELS // images[0].size, 1)) if len(images) else _BATCH
-    parts = [_find(images[i : i + size], layout, name, threshold, _PASSES) for i in range(0, len(images), size)]
+    parts = [_find(some, layout, name, threshold, _PASSES) for some in _split(images, _BATCH)]
     found = Shape(**{key: np.concatenate([vars(part)[key] for part in parts]) for key in vars(parts[0])})
     return _judged(found, images, layout) if judged and name == "strip" and layout.arrangement else found
 
@@ -91,32 +90,57 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
         return shape
     lengths = np.array([caliper.length for caliper in calipers])
     offsets, errors = at_ends(estimate.level, estimate.slope, lengths), end_errors(lines, lengths)
-    far = ~(np.abs(offsets) <= capture(ESTIMATORS[name].capture_px, errors)).all((1, 2))
+    there = (np.abs(offsets) <= capture(ESTIMATORS[name].capture_px, errors)).all(2)
+    far = ~there.all(1)
     lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
     if not far.any() or passes == 0:
         return _refuse(shape, far)
     parts = [shape]
     rows = np.arange(len(images))
     source = np.zeros(len(images), int)
-    for move, which in _expectations(images, layout, offsets, far, lost, passes == _PASSES):
-        source[which], rows[which] = len(parts), np.arange(len(which))
-        parts.append(_find(images[which], move, name, threshold, passes - 1))
+    if layout.clutter is not None:  # of a known picture an edge that is caught stays, whatever others do
+        offsets = np.where(there[..., None], 0.0, offsets)
+    reach = ESTIMATORS[name].capture_px if passes == _PASSES else None
+    for move, every in _expectations(images, layout, offsets, far, lost, reach):
+        for which in _split(every, _copied(images)):
+            source[which], rows[which] = len(parts), np.arange(len(which))
+            parts.append(_find(images[which], move, name, threshold, passes - 1))
     return gather(parts, source, rows)
 
 
-def _expectations(images, layout, offsets, far, lost, first):
-    """(layout, images' indices) for the images whose edges are elsewhere: sought anew, or moved to where they seem."""
-    if first and lost.any():
+def _split(values: np.ndarray, size: int) -> list[np.ndarray]:
+    """In blocks, one after another."""
+    return [values[first : first + size] for first in range(0, len(values), size)]
+
+
+def _copied(images: np.ndarray) -> int:
+    """How many images are copied at a time."""
+    return max(_COPIED // images[0].size, 1)
+
+
+def _expectations(images, layout, offsets, far, lost, reach):
+    """(layout, images' indices) for the images whose edges are elsewhere: sought anew, where ``reach`` is given, px, or
+    moved to where they seem."""
+    if reach is not None and lost.any():
         which = np.flatnonzero(lost)
-        poses = align(images[which], layout)
+        poses = np.concatenate([align(images[some], layout) for some in _split(which, _copied(images))])
         for pose in np.unique(poses, axis=0):
-            if pose.any():
-                yield _moved(layout, tuple(pose[:2].tolist()), float(pose[2])), which[(poses == pose).all(1)]
+            move, own = _moved(layout, tuple(pose[:2].tolist()), float(pose[2])), which[(poses == pose).all(1)]
+            known = layout.clutter is not None
+            if pose.any() and not (known and _away(move, layout) <= reach):
+                yield move, own
+            elif known:  # all are caught from where they are expected: what is far is another edge
+                lost[own] = False
         far = far & ~lost
     which = np.flatnonzero(far & np.isfinite(offsets).all((1, 2)))
     keys = np.round(np.clip(offsets[which], -1, 1) / _GRID) * _GRID
     for key in np.unique(keys, axis=0):
         yield _shifted(layout, tuple(key.ravel().tolist())), which[(keys == key).all((1, 2))]
+
+
+def _away(moved: Layout, layout: Layout) -> float:
+    """How far off an edge lies, across it, from where another layout has it, at most, px."""
+    return float(np.abs(np.einsum("eki,ei->ek", moved.ends - layout.ends, layout.normals)).max())
 
 
 def _assemble(tool: Estimator, layout: Layout, estimate: Estimate, lines: np.ndarray) -> Shape:

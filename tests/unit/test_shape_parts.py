@@ -1,11 +1,13 @@
 """Parts of the search for a shape: errors at the ends of lines, and what is reported of lines and of nothing."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import scenes
+from measure.features import shape
 from measure.features.arranged import _nothing, line_rows
 from measure.features.layout import layout_of
 from measure.features.lines import end_errors
@@ -75,3 +77,21 @@ def test_nothing_is_reported_of_an_edge_that_is_not_seen(task1):
 def test_scenes_have_no_such_edge_by_default(task1):
     layout = layout_of(Picture.of(scenes.load("task1"), Pose(30, 135), Pose(15, 315)))
     assert layout.visible.all()
+
+
+def test_of_a_known_picture_a_layout_is_moved_only_where_its_edges_would_not_be_caught(task1, monkeypatch):
+    """Half a px off all of them are; of a layout that is a guess it is moved there, too."""
+    layout = layout_of(Picture.of(task1, Pose(30.0, 135.0), Pose(15, 315)))
+    images, offsets = np.zeros((2, 24, 32)), np.zeros((2, len(layout.names), 2))
+    offsets[:, 1] = [0.9, 2.0]
+    monkeypatch.setattr(shape, "align", lambda some, _: np.array([[0.5, 0.0, 0.0], [6.0, 4.0, 0.0]])[: len(some)])
+    every = np.ones(2, bool)
+    (far, second), (near, first) = shape._expectations(images, layout, offsets, every, every.copy(), 1.5)
+    assert (first.tolist(), second.tolist()) == ([0], [1])
+    assert far.ends == pytest.approx(layout.ends + [6.0, 4.0])
+    away = np.abs(np.einsum("eki,ei->ek", near.ends - layout.ends, layout.normals))
+    assert away == pytest.approx(np.where(np.arange(len(away)) == 1, [[0.875], [1.0]], 0.0).T)
+    guess = replace(layout, clutter=None)
+    told = list(shape._expectations(images, guess, offsets, every, every.copy(), 1.5))
+    assert [which.tolist() for _, which in told] == [[0], [1]]
+    assert told[0][0].ends == pytest.approx(layout.ends + [0.5, 0.0])
