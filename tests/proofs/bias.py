@@ -104,7 +104,8 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
         away = np.where(is_trusted(found.status), found.value - true, np.nan)
         beside = np.hypot(_by_inputs(found.u_bias, off), np.hypot(off.sources[RENDERING], own))
         left.append(away[0] / beside[0])
-        noisy += list(away[1:] / np.hypot(off.sigma, beside[1:]))
+        sigma = np.sqrt(np.einsum("kmm->km", found.covariance))  # as each picture is told its own
+        noisy += list(away[1:] / np.hypot(sigma, beside)[1:])
     names = tuple(quantity.name for quantity in scene.quantities)
     return Pulls(scene.name, names, off.status, off.bias / off.sigma, np.array(left), np.array(noisy))
 
