@@ -11,6 +11,7 @@ from scipy import sparse
 import measure
 import planner
 import render
+from imaging.models import inputs
 from measure import Images
 from scenes import Floor, ImageTexture, InvalidInput, Picture, Pose, load
 from scenes.status import corrected
@@ -18,7 +19,7 @@ from tests.oracle import block_image
 from validation import kept, picture_file, simulation
 from validation.remeasured import Method
 from validation.report import budget_table
-from validation.simulation import corrections, inputs
+from validation.simulation import corrections
 
 ESTIMATORS = ("gradient", "isophote", "canny", "strip", "arrangement")
 

@@ -14,6 +14,7 @@ import planner
 import scenes
 from imaging.colour import seen
 from imaging.geometry.projection import project
+from imaging.models.inputs import of_other_surfaces, with_lights_moved
 from imaging.models.texture import texture_errors
 from imaging.pictures import Pictures
 from measure import Correction, Images
@@ -239,7 +240,7 @@ def test_lights_are_moved_one_at_a_time():
     """Each a hundredth of its distance away, and by as much to the side; all else stays."""
     scene = scenes.load("two_lights").with_(uncertainty={"light_place": 0.01})
     picture = Picture.of(scene, (60, 277), [(75, 280), (45, 276)])
-    moved, seen = list(inputs.with_lights_moved(picture)), []
+    moved, seen = list(with_lights_moved(picture)), []
     for each in moved:
         far = [b.distance / a.distance for a, b in zip(scene.lights, each.scene.lights, strict=True)]
         turned = [_angle(a, b) for a, b in zip(picture.lights, each.lights, strict=True)]
@@ -271,7 +272,7 @@ def test_each_surface_reflects_less_by_a_tenth_or_more():
         return each.material.specular_fraction, each.floor.reflectance, each.materials[0].diffuse_reflectance
 
     for times, part in ((1.0, 0.9), (-1.0, 1.1)):
-        others = inputs.of_other_surfaces(picture, times)
+        others = of_other_surfaces(picture, times)
         found = [np.divide(reflected(each.scene), reflected(scene)) for each in others]
         assert np.array(found) == pytest.approx(np.array([[part, 1, 1], [1, part, 1], [1, 1, part]]))
     assert scene.floor.reflectance == 0.2
@@ -281,7 +282,7 @@ def test_the_light_in_closed_form_is_what_exact_images_show(task1):
     """The value is measured in an exact image for each other place of the light; a place farther away changes none."""
     scene, values = task1.with_(uncertainty={"light_place": 0.05}), []
     picture = Picture.of(scene, (30, 135), (15, 315))
-    for each in (picture, *inputs.with_lights_moved(picture)):
+    for each in (picture, *with_lights_moved(picture)):
         image = block_image(scene, (30, 135), tuple(each.lights[0]))
         found = measure.measure(image, picture, estimator="gradient")
         values.append((found.value[0], found.first.value_px))
@@ -322,7 +323,7 @@ def test_lights_elsewhere_are_drawn_where_the_image_model_draws_the_render(small
     images = imagery.completed(picture, (first,), (), How().by(Method("arrangement")))
     assert len(shown) == rendered
     read = measure.region_of_interest(picture, estimators=("arrangement",)) | bool(rendered)
-    others = [planner.image(each) - here for each in inputs.with_lights_moved(picture, math.sqrt(3.0))]
+    others = [planner.image(each) - here for each in with_lights_moved(picture, math.sqrt(3.0))]
     for made, other in zip(changed(images, "light_place")[::2], others, strict=True):
         assert np.abs(other[read]).max() > 0.1
         of_first_order = pytest.approx(other[read] / math.sqrt(3.0), abs=0.1 * np.abs(other).max())
@@ -563,7 +564,7 @@ def test_a_shadow_that_reaches_an_edge_from_where_a_light_may_stand_counts(monke
     shadow = 100.0 / (2 * math.sqrt(3.0))
     assert (here - straight)[0, 1] == pytest.approx(shadow, rel=0.01)  # the rest is scaled to the same sum of squares
     assert (here - bent)[0, 1] == pytest.approx(0.0 if overall else shadow, rel=0.01, abs=1e-12)
-    near = next(inputs.with_lights_moved(picture))
+    near = next(with_lights_moved(picture))
     assert rendered(None, near, None, 0) == pytest.approx(here)  # negative control: one standard uncertainty tells none
 
 
@@ -587,7 +588,7 @@ def test_a_reflectance_does_what_it_does_on_both_sides(monkeypatch, overall):
     assert by_part == pytest.approx([1.0, 1 / (1 - r) ** 2], rel=0.02)
     off = 0.0 if overall else r / (1 - r) ** 3 * u**2  # half its second derivative
     assert (bent - here)[0] / 100.0 == pytest.approx([0.0, off], rel=0.03, abs=1e-12)
-    one_sided = (here - rendered(None, next(inputs.of_other_surfaces(picture)), None, 0))[0]
+    one_sided = (here - rendered(None, next(of_other_surfaces(picture)), None, 0))[0]
     assert one_sided[1] < 0.95 * (here - straight)[0, 1]  # negative control
 
 

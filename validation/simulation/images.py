@@ -14,7 +14,6 @@ brighter or darker as a whole, which moves nothing, is not told by few rays but 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache, partial
@@ -26,6 +25,7 @@ import measure
 from imaging.blurred.whole import image as drawn
 from imaging.blurred.whole import is_drawable
 from imaging.colour import seen
+from imaging.models.inputs import LIMIT, of_other_surfaces, u_of, with_lights_moved
 from measure import Images
 from render import modelled
 from render.build import MANY_WAYS
@@ -34,18 +34,8 @@ from render.surroundings import near_required
 from scenes import Picture
 from validation.simulation.dimmed import of_one_surface
 from validation.simulation.how import BETWEEN, How, is_below
-from validation.simulation.inputs import (
-    LIGHT,
-    REFLECTANCE,
-    light_in_closed_form,
-    lines_by_lights,
-    of_other_surfaces,
-    of_unknown_kinds,
-    u_of,
-    with_lights_moved,
-)
+from validation.simulation.inputs import LIGHT, REFLECTANCE, light_in_closed_form, lines_by_lights, of_unknown_kinds
 
-_LIMIT = math.sqrt(3.0)  # standard deviations: the end of a uniform distribution, where a shadow may reach an edge
 _SETS = 4  # of rays that tell what changes a bias that is not known well enough
 _OVERALL = {"supersample": 1, "samples": 1, "edge_samples": 4, "random_samples": 16}
 _DRAWN = 0.1  # of a pixel's noise: nearer to a render, the image model tells what a light elsewhere does
@@ -79,7 +69,7 @@ def completed(
         drawing = cache(partial(drawn, where=_read(picture, how)))
         rendered = whole if is_below(picture, LARGE) else direct
         made = drawing if _is_drawn(picture, first, drawing) else rendered
-        changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, _LIMIT)
+        changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, LIMIT)
     modelled.forget()
     changed = {name: some for name, some in changed.items() if some.shape[0]}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
@@ -104,7 +94,7 @@ def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
     """Images of all of a picture, as `measure.Images` has them, with what others of it have changed."""
     how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
     pairs = [(pair, 1.0) for pair in _pairs(of_other_surfaces, picture)]
-    pairs += [(pair, _LIMIT) for pair in _pairs(with_lights_moved, picture, _LIMIT) if LIGHT in images.changed]
+    pairs += [(pair, LIMIT) for pair in _pairs(with_lights_moved, picture, LIMIT) if LIGHT in images.changed]
     for seed in range(2):
         alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
         levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
