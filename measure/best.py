@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from imaging.light.appearance import is_plain
 from imaging.models.arranged import is_arranged
 from measure.estimators.arrangement import ArrangementEstimator
 from measure.estimators.registry import is_for
@@ -30,10 +31,13 @@ def best_estimator(scene: Scene | Picture) -> str:
 def other_estimators(scene: Scene) -> tuple[str, ...]:
     """What may know more of some values where the best one does not know enough, the quickest first.
 
-    ``isophote`` reads less far beside an edge, and ``strip`` finds levels where ``gradient`` finds slopes: what a
-    shadow or a bright face nearby does to the one, and how much of it follows a reflectance that is not known, is not
-    what it does to the other.
+    Where things hide or light each other ``strip`` takes the levels beside an edge from the scene, with what that is
+    not sure of as unknowns, and is asked alone. Elsewhere ``isophote`` reads less far beside an edge, and ``strip``
+    finds levels where ``gradient`` finds slopes: what a shadow or a bright face nearby does to the one is not what it
+    does to the other.
     """
+    if not is_plain(scene) and is_for("strip", scene.noise):
+        return ("strip",)
     return tuple(name for name in _OTHERWISE if is_for(name, scene.noise))
 
 

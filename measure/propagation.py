@@ -233,7 +233,7 @@ def _of_lines(
 def _is_in_place(found: MeasuredFeatures, layout: Layout, estimator: str) -> bool:
     """Whether the lines are measured from where they are expected: else drawn noise there says nothing of them."""
     away = np.einsum("ei,eki->ek", found.shape.normals[0], layout.ends - found.shape.points[0][:, None])
-    return bool((np.abs(away) <= ESTIMATORS[estimator].capture_px).all())
+    return bool((np.abs(away) <= ESTIMATORS[estimator].of(layout).capture_px).all())
 
 
 def _of_measured(gradient: np.ndarray, state: list[str]) -> np.ndarray:

@@ -20,7 +20,8 @@ from measure.estimators.beside import SideLevel, misled
 from measure.estimators.crossing import CrossingLocator, gaussian_rows, reached
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.separate import PointEstimator, SeparateEstimator, calipers_for, measurable, thinned
-from measure.estimators.strip import HALF_WIDTH, pixels_beside
+from measure.estimators.strip import HALF_WIDTH
+from measure.estimators.strip_pixels import pixels_beside
 from measure.estimators.windows import places_across
 from measure.features.calipers import Caliper
 from measure.features.layout import BACKGROUND, Layout

@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import cast
 
+from imaging.light.appearance import is_plain
 from measure.estimators.estimate import Estimator
 from measure.estimators.separate import SeparateEstimator
 from measure.features.layout import Layout
-from scenes import InvalidInput
+from scenes import InvalidInput, Scene
 from scenes.registry import Registry
 
 _AND, _AT = ", ", " at "
@@ -34,6 +35,8 @@ class EstimatorKind:
         Whether it looks at no pixel farther from its edges than the scene's `window_px` and the scale of its filter.
     separate : bool
         Whether it measures each edge by itself, so that others may be measured by another one (`mixed_estimator`).
+    knowing : EstimatorKind, optional
+        What stands in its place where things hide or light each other and the scene's levels are known.
     """
 
     prepare: Callable[[Layout, float], Estimator]
@@ -42,6 +45,15 @@ class EstimatorKind:
     bias_predicted: bool = False
     local: bool = False
     separate: bool = False
+    knowing: EstimatorKind | None = None
+
+    def of(self, layout: Layout) -> EstimatorKind:
+        """The kind that measures in a layout."""
+        return self if self.knowing is None or layout.levels is None else self.knowing
+
+    def within(self, scene: Scene) -> EstimatorKind:
+        """The kind that measures in a scene whose lights are known."""
+        return self if self.knowing is None or is_plain(scene) else self.knowing
 
     def with_edges(self, other: EstimatorKind, edges: frozenset[str]) -> EstimatorKind:
         """The kind that measures these edges, by their names, by another one."""
@@ -72,16 +84,16 @@ class Estimators(Registry[EstimatorKind]):
         other, at, edges = rest.partition(_AT)
         if not (comma and at):
             return super().__getitem__(name)
-        pair = super().__getitem__(one), super().__getitem__(other)
+        pair = tuple(kind if kind.separate else kind.knowing or kind for kind in map(super().__getitem__, (one, other)))
         if not all(kind.separate for kind in pair):
             raise InvalidInput(f"estimator must be of two that measure each edge by itself, got {name!r}")
         return pair[0].with_edges(pair[1], frozenset(edges.split()))
 
 
-def mixed_estimator(one: str, other: str, edges: Iterable[str]) -> str | None:
+def mixed_estimator(one: str, other: str, edges: Iterable[str], scene: Scene | None = None) -> str | None:
     """Name of the estimator that measures as one does, but some edges, by their names, as another does.
 
-    None where one of the two does not measure each edge by itself.
+    None where one of the two does not measure each edge by itself, in a scene or in all of them.
 
     Examples
     --------
@@ -89,7 +101,8 @@ def mixed_estimator(one: str, other: str, edges: Iterable[str]) -> str | None:
     'gradient, isophote at e3 e7'
     >>> mixed_estimator("gradient", "arrangement", ["e7"])
     """
-    if not all(ESTIMATORS[name].separate for name in (one, other)):
+    kinds = [ESTIMATORS[name] if scene is None else ESTIMATORS[name].within(scene) for name in (one, other)]
+    if not all(kind.separate for kind in kinds):
         return None
     return f"{one}{_AND}{other}{_AT}{' '.join(sorted(edges))}"
 

@@ -8,7 +8,7 @@ expectation moves there and the step is repeated (`measure.distance`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -34,6 +34,8 @@ class Columns:
         Change of the coverage with an edge's offset, and with its tilt about the edge's middle.
     blurs : ndarray, shape (P, b)
         Change of the coverage with the blur.
+    inputs : ndarray, shape (k, P)
+        Change of the grey levels with one standard uncertainty of each of k inputs that are known so well before.
     """
 
     levels: np.ndarray
@@ -41,6 +43,7 @@ class Columns:
     stop: np.ndarray
     offsets: np.ndarray
     blurs: np.ndarray
+    inputs: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +70,30 @@ class LikelihoodEstimator:
 
     @classmethod
     def of(
-        cls, calipers: tuple[Caliper, ...], pixels: np.ndarray, columns: Columns, optics: Optics
+        cls,
+        calipers: tuple[Caliper, ...],
+        pixels: np.ndarray,
+        columns: Columns,
+        optics: Optics,
+        deviation: float = 1.0,
     ) -> LikelihoodEstimator:
-        """Solve the normal equations once, by an orthogonal decomposition of the scaled columns."""
-        design = np.concatenate([columns.offsets, columns.levels, columns.blurs], 1)
+        """Solve the normal equations once, by an orthogonal decomposition of the scaled columns.
+
+        What is known of inputs before counts as an observation of each (Mikhail and Ackermann, Observations and Least
+        Squares, 1976); ``deviation`` is the standard deviation of the pixels' noise, grey levels.
+        """
+        free = np.concatenate([columns.offsets, columns.levels, columns.blurs], 1)
+        known = len(columns.inputs)
+        design = np.zeros((len(pixels) + known, free.shape[1] + known))
+        design[: len(pixels), : free.shape[1]] = free
+        if known:
+            design[: len(pixels), free.shape[1] :] = columns.inputs.T
+            design[len(pixels) :, free.shape[1] :] = deviation * np.eye(known)
         size = np.linalg.norm(design, axis=0)
         keep = size > 1e-6 * size.max()
         q, r = np.linalg.qr(design[:, keep] / size[keep])
         inverse = np.zeros((design.shape[1], len(pixels)))
-        inverse[keep] = np.linalg.solve(r, q.T) / size[keep, None]
+        inverse[keep] = np.linalg.solve(r, q[: len(pixels)].T) / size[keep, None]
         first = columns.offsets.shape[1]
         levels = inverse[first : first + columns.levels.shape[1]]
         rows = np.concatenate([inverse[:first], columns.start @ levels, columns.stop @ levels])

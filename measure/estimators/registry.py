@@ -54,4 +54,4 @@ def estimator(layout: Layout, name: str, threshold: float = 12.0) -> Estimator:
         others = ", ".join(each for each in ESTIMATORS if each not in _ALIKE)
         why = "colour, whose pixels are not alike" if sensor.colour else "row_sigma or column_sigma, which pixels share"
         raise InvalidInput(f"estimator must be one of {others} with noise.{why}, got {name!r}")
-    return ESTIMATORS[name].prepare(layout, threshold)
+    return ESTIMATORS[name].of(layout).prepare(layout, threshold)

@@ -7,19 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from imaging.features.locator import CLEARANCE, edge_blur
-from imaging.geometry.segments import distance_to_segment, pixels_along, within_reach
 from measure.estimators.beside import SideLevel, misled
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
 from measure.estimators.kinds import EstimatorKind
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
+from measure.estimators.scene_strip import SCENE_STRIP
+from measure.estimators.strip_pixels import LEAST_BLUR, are_own, pixels_beside
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout
 from scenes import status
 
-NEARER = 1.5  # a pixel belongs to an edge if it is this many times nearer to it than to a crowding one
 SLIVER = 2.0  # px: a face thinner than this beside an edge is not told from the blur
-LEAST_BLUR = 0.3  # px: a sharper edge is not resolved by the pixels
-_MARGIN = 2.0  # px that a lens may make a strip wider in its recording
 HALF_WIDTH = 16.0  # px to each side; wider hardly helps, since the levels are then known well enough
 
 
@@ -79,35 +77,10 @@ def strip_estimator(
 def _strip(layout: Layout, caliper: Caliper, index: int, clear: float) -> tuple[np.ndarray, ...]:
     """Pixels of the strip (flat indices), their ideal coordinates, and those in the caliper (along, across)."""
     flat, points, along, across = pixels_beside(caliper, HALF_WIDTH)
-    keep = np.ones(flat.size, bool)
-    # an edge may be required twice, once for each of its corners
-    task = [ends for ends in layout.ends[layout.visible] if not np.array_equal(ends, layout.ends[index])]
-    apart = {segment.tobytes() for segment in layout.apart[index]}
-    for segment in within_reach(np.concatenate([np.reshape(task, (-1, 2, 2)), layout.others]), points, clear):
-        away = distance_to_segment(points[keep], *segment)
-        crowded = segment.tobytes() in apart  # too near all along: nothing would be left, so it is flagged instead
-        keep[keep] = (away > clear) | (crowded & (away > NEARER * np.abs(across[keep])))
+    keep = are_own(layout, index, points, across, clear)
     expected = np.where(across > 0, *layout.sides[index])
     keep &= (layout.face_at(flat) == expected) | (np.abs(across) < 1)
     return flat[keep], points[keep], along[keep], across[keep]
-
-
-def pixels_beside(caliper: Caliper, half_width: float) -> tuple[np.ndarray, ...]:
-    """Pixels (flat indices) within ``half_width`` px of the part of an edge that is used.
-
-    With them their ideal coordinates (P, 2), px, and those in the caliper (along, across).
-    """
-    shape = caliper.optics.shape
-    ends = caliper.positions[[0, -1]]
-    used = caliper.optics.recorded(caliper.at(np.linspace(*ends, 17), np.zeros(17)))
-    bow = distance_to_segment(used, used[0], used[-1]).max()
-    y, x = pixels_along(used[0], used[-1], half_width + bow + _MARGIN, shape)
-    points = caliper.optics.ideal(np.stack([x, y], 1).astype(float))
-    along, across = caliper.coordinates(points)
-    near = (
-        (np.abs(across) <= half_width) & (along >= caliper.positions[0] - 0.5) & (along <= caliper.positions[-1] + 0.5)
-    )
-    return (y * shape[1] + x)[near], points[near], along[near], across[near]
 
 
 def _misled(layout: Layout, index: int, caliper: Caliper, strip: tuple[np.ndarray, ...]) -> bool:
@@ -138,4 +111,4 @@ def _prepared(layout: Layout, threshold: float) -> LikelihoodEstimator:
     return LikelihoodEstimator.joined(tuple(calipers), parts)
 
 
-STRIP = EstimatorKind(_prepared, capture_px=0.125, exact_px=2e-3)
+STRIP = EstimatorKind(_prepared, capture_px=0.125, exact_px=2e-3, knowing=SCENE_STRIP)

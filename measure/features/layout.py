@@ -19,6 +19,7 @@ from imaging.models.strong import strong_pieces
 from imaging.pictures import Pictures
 from imaging.sensor import headroom
 from measure.estimators.shading import Shading, face_shadings
+from measure.features.levels import SceneLevels
 from measure.features.looks import Looks
 from measure.features.optics import Optics
 from scenes import Edge, Picture, Scene, Solid
@@ -66,6 +67,8 @@ class Layout:
         Where the light is known, the piece of each edge that stands out of the noise, as fractions of its length.
     looks : Looks, optional
         The levels that the scene shows, where the light is known and they may be others than faces' shadings say.
+    levels : SceneLevels, optional
+        Those beside each edge, where the light is known and things hide or light each other.
     """
 
     names: tuple[str, ...]
@@ -86,6 +89,7 @@ class Layout:
     clutter: np.ndarray | None = None
     strong: np.ndarray | None = None
     looks: Looks | None = None
+    levels: SceneLevels | None = None
 
     def moved(self, shift: tuple[float, float], turn: float) -> Layout:
         """The layout turned by ``turn`` (rad, x towards y) about the middle of its edges and shifted (px)."""
@@ -236,6 +240,7 @@ def _layout(picture: Picture, pictures: Pictures) -> Layout:
         clutter=cluttered(pictures) if picture.lights else None,
         strong=strong_pieces(pictures, view) if picture.lights else None,
         looks=Looks.of(pictures) if picture.lights and _is_uneven(pictures, seen) else None,
+        levels=SceneLevels(picture) if picture.lights and not is_plain(scene) else None,
     )
 
 

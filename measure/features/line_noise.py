@@ -52,7 +52,7 @@ def torn(clean: np.ndarray, layout: Layout, name: str, threshold: float, respons
             offsets, measured = _offsets(images[start : start + some].whole(clean.shape), layout, name, threshold)
             full.append(offsets - here)
             found.append(measured)
-        if len(linear) == 1 and _is_dear(name) and _most(jumps := _jumping(linear, full, found)):
+        if len(linear) == 1 and _is_dear(layout, name) and _most(jumps := _jumping(linear, full, found)):
             return np.ones_like(jumps)
     return _jumping(linear, full, found)
 
@@ -63,10 +63,10 @@ def _jumping(linear: list[np.ndarray], full: list[np.ndarray], found: list[np.nd
     return np.array([not is_linear(*edge) for edge in zip(*columns, strict=True)])
 
 
-def _is_dear(name: str) -> bool:
+def _is_dear(layout: Layout, name: str) -> bool:
     """Whether an estimator reaches so little that most images would be looked at from places of their own; not one of
     two, which is asked where each of them has told something."""
-    return name in ESTIMATORS and ESTIMATORS[name].capture_px < _LITTLE
+    return name in ESTIMATORS and ESTIMATORS[name].of(layout).capture_px < _LITTLE
 
 
 def _most(jumps: np.ndarray) -> bool:
@@ -82,7 +82,7 @@ def _is_doubtful(clean: np.ndarray, layout: Layout, name: str, threshold: float)
     estimate = tool.estimate(images)
     errors = end_errors(tool.covariance(estimate, images), _lengths(tool))
     offsets = at_ends(estimate.level, estimate.slope, _lengths(tool))
-    beyond = np.abs(offsets) - capture(ESTIMATORS[name].capture_px, errors)
+    beyond = np.abs(offsets) - capture(ESTIMATORS[name].of(layout).capture_px, errors)
     with np.errstate(divide="ignore", invalid="ignore"):
         chance = ndtr(beyond / errors)  # of no noise 0 or 1
     return not chance.max() < _RARE  # NaN: what is not found is looked for again

@@ -90,7 +90,7 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
         return shape
     lengths = np.array([caliper.length for caliper in calipers])
     offsets, errors = at_ends(estimate.level, estimate.slope, lengths), end_errors(lines, lengths)
-    there = (np.abs(offsets) <= capture(ESTIMATORS[name].capture_px, errors)).all(2)
+    there = (np.abs(offsets) <= capture(ESTIMATORS[name].of(layout).capture_px, errors)).all(2)
     far = ~there.all(1)
     lost = far & ((estimate.state == status.LOW_CONTRAST).any(1) | ~(np.abs(offsets) < _LOST).all((1, 2)))
     if not far.any() or passes == 0:
@@ -100,7 +100,7 @@ def _find(images: np.ndarray, layout: Layout, name: str, threshold: float, passe
     source = np.zeros(len(images), int)
     if layout.clutter is not None:  # of a known picture an edge that is caught stays, whatever others do
         offsets = np.where(there[..., None], 0.0, offsets)
-    reach = ESTIMATORS[name].capture_px if passes == _PASSES else None
+    reach = ESTIMATORS[name].of(layout).capture_px if passes == _PASSES else None
     for move, every in _expectations(images, layout, offsets, far, lost, reach):
         for which in _split(every, _copied(images)):
             source[which], rows[which] = len(parts), np.arange(len(which))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from measure.estimators.coverage import NODE_WEIGHTS, NODES, density, half_plane
-from measure.estimators.strip import LEAST_BLUR, pixels_beside
+from measure.estimators.strip_pixels import LEAST_BLUR, pixels_beside
 from measure.features.calipers import Caliper, edge_calipers
 from measure.features.layout import Layout
 from measure.goodness import p_value

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import chdtrc
 
-from measure.estimators.strip import LEAST_BLUR
+from measure.estimators.strip_pixels import LEAST_BLUR
 from measure.features.layout import polygon_layout
 from measure.photo.blur import side_blur
 from measure.photo.expected import optics_of

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure.estimators.strip import pixels_beside
+from measure.estimators.strip_pixels import pixels_beside
 from measure.features.calipers import edge_calipers
 from measure.features.layout import Layout, polygon_layout
 from measure.features.optics import Optics

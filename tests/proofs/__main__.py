@@ -23,7 +23,6 @@ from tests.proofs.hollow import hollow
 from tests.proofs.installed import installed
 from tests.proofs.kill import kill
 from tests.proofs.kinds import kinds
-from tests.proofs.known_levels import known_levels
 from tests.proofs.known_sizes import known_sizes
 from tests.proofs.large import large
 from tests.proofs.lights import lights
@@ -67,7 +66,6 @@ app.command()(hollow)
 app.command()(installed)
 app.command()(kill)
 app.command()(kinds)
-app.command()(known_levels)
 app.command()(known_sizes)
 app.command()(large)
 app.command()(lights)

@@ -92,7 +92,7 @@ def pulls(picture: Picture, trials: int, seed: int, images: int = 1, estimator: 
     """Of a picture, its reflectances and lights drawn anew in each trial; by the estimator that `ice measure` takes."""
     scene, rng = picture.scene, np.random.default_rng(seed)
     off = simulation.simulated(picture, Method(estimator)) if estimator else simulation.best(picture)
-    everywhere = off.adjusted is not None or not measure.ESTIMATORS[off.estimator].local
+    everywhere = off.adjusted is not None or not measure.ESTIMATORS[off.estimator].within(scene).local
     (true, own), left, noisy = _true(picture, off), [], []
     for trial in range(trials):
         actual = Picture(deviating(scene, rng), picture.sensor, tuple(moved(pose, rng) for pose in picture.lights))

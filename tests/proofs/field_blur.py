@@ -71,7 +71,7 @@ def rows(
 ) -> tuple[list[Row], list[Row]]:
     """All numbers of a picture, told with the field and without it; by the best estimator or a named one."""
     method = Method(locator or measure.best_estimator(picture.scene))
-    everywhere = not measure.ESTIMATORS[method.locator].local
+    everywhere = not measure.ESTIMATORS[method.locator].within(picture.scene).local
     clean = render.image(picture, quality=render.Quality(seed=seed, everywhere=everywhere))
     taken = render.expose(clean, picture.scene.noise, rng, images)
     true = np.array([each.value_object for each in planner.predict(picture).measurands])

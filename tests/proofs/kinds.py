@@ -107,7 +107,7 @@ def rows(
     scene = picture.scene
     method = Method(measure.best_estimator(scene))
     off = simulation.simulated(picture, method)
-    everywhere = not measure.ESTIMATORS[method.locator].local
+    everywhere = not measure.ESTIMATORS[method.locator].within(scene).local
     clean = render.image(picture, quality=render.Quality(seed=seed, everywhere=everywhere))
     found = measure.measure(render.expose(clean, scene.noise, rng, images), picture, correction=off)
     true = np.array([values[name] for name in found.names])

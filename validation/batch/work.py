@@ -228,7 +228,7 @@ def render_setting(case: Case, variant: str, how: Rendering = Rendering(), image
     clock.lap("predict")
     renders = None
     used = methods(scene)
-    way = simulation.How(how.quality, variant, how.effects, how.tolerance).by(*used)
+    way = simulation.How(how.quality, variant, how.effects, how.tolerance).by(*used, of=scene)
     photographed = image is not None
     if not photographed:
         image = render.image(picture, variant=variant, **vars(how))

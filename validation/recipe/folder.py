@@ -53,7 +53,7 @@ def write(made: Export, source: str, folder: Path) -> dict[str, Any]:
 
 def recorded(made: Export) -> np.ndarray:
     """A noise-free picture of the scene as its sensor records it: rendered where something is measured."""
-    noise, how = made.picture.scene.noise, How().by(Method(made.facts["estimator"])).rough
+    noise, how = made.picture.scene.noise, How().by(Method(made.facts["estimator"]), of=made.picture.scene).rough
     if made.correction is not None and made.correction.adjusted is not None:
         how = How(quality=how.quality, everywhere=True)
     image = how.image(made.picture)

@@ -39,7 +39,7 @@ def of_render(
     picture: Picture, method: Method, image: np.ndarray, propagated: PropagatedValues, how: How = How()
 ) -> Correction:
     """The correction that one render tells, where settings are compared: how noisy the render is, is left out."""
-    how = how.by(method)
+    how = how.by(method, of=picture.scene)
     images, none = completed(picture, (image,), (), how), np.zeros(len(picture.scene.quantities))
     images = replace(images, known={**images.known, RENDERING: (none, none)})
     return measure.correction(images, picture, method.locator, method.threshold, propagated)
@@ -52,7 +52,7 @@ def simulated(picture: Picture, method: Method, how: How = How()) -> Correction:
     of sigma or a hundredth of the tolerance, or as many as six if these make it so; else of all rays, and renders of
     other rays are added until it is, six at most.
     """
-    return _simulated(picture, method, how.by(method).gathering)
+    return _simulated(picture, method, how.by(method, of=picture.scene).gathering)
 
 
 def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simulated) -> Correction:
@@ -67,9 +67,9 @@ def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simul
     found = made(picture, Method(measure.best_estimator(picture)))
     for name in measure.other_estimators(picture.scene):
         if not _may_be_told(picture, found, name):
-            break
+            continue
         tried = [found, made(picture, Method(name))]
-        mixed = _by_edges(*tried)
+        mixed = _by_edges(*tried, picture.scene)
         if mixed is not None:
             tried.append(made(picture, Method(mixed)))
         found = max(tried, key=_trusted)  # the first of them
@@ -77,13 +77,15 @@ def best(picture: Picture, made: Callable[[Picture, Method], Correction] = simul
 
 
 def _may_be_told(picture: Picture, found: Correction, name: str) -> bool:
-    """Whether another estimator may tell more: one that looks where nothing is measured, too, takes long."""
-    states = {ILL_CONDITIONED} | ({LOW_CONTRAST, SIGN_CHANGE} if is_below(picture, LARGE) else set())
-    unknown, unseen = CLUTTER in found.status and is_below(picture, LARGE), not states.isdisjoint(found.simulated)
-    return unknown or (unseen and measure.ESTIMATORS[name].local)
+    """Whether another estimator may tell more: in large images one that looks where nothing is measured, too, takes
+    long."""
+    small, unsure = is_below(picture, LARGE), {ILL_CONDITIONED} & set(found.simulated)
+    if not small:
+        return bool(unsure) and measure.ESTIMATORS[name].within(picture.scene).local
+    return CLUTTER in found.status or bool(unsure) or not {LOW_CONTRAST, SIGN_CHANGE}.isdisjoint(found.simulated)
 
 
-def _by_edges(found: Correction, other: Correction) -> str | None:
+def _by_edges(found: Correction, other: Correction, scene: Scene) -> str | None:
     """The estimator that measures the edges of values that the other alone tells by that, the rest as before.
 
     None where one of both tells all that the other does, or their edges cannot be measured one by one.
@@ -92,7 +94,7 @@ def _by_edges(found: Correction, other: Correction) -> str | None:
     if not ((one & ~two).any() and (two & ~one).any()):
         return None
     names = {name for quantity, new in zip(found.quantities, two & ~one, strict=True) if new for name in quantity.edges}
-    return measure.mixed_estimator(found.estimator, other.estimator, names)
+    return measure.mixed_estimator(found.estimator, other.estimator, names, scene)
 
 
 def _trusted(found: Correction) -> int:

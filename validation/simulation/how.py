@@ -14,7 +14,7 @@ from render import variant as variants
 from render.build import MANY_WAYS
 from render.gathered import is_gathered
 from render.large import LARGE
-from scenes import Picture
+from scenes import Picture, Scene
 from validation.remeasured import Method
 
 BETWEEN = "interreflection"
@@ -40,9 +40,10 @@ class How:
     predicted: bool = False
     readers: tuple[str, ...] = ()
 
-    def by(self, *methods: Method) -> How:
-        """Everywhere, if one of the methods looks at more than the surroundings of what is measured."""
+    def by(self, *methods: Method, of: Scene | None = None) -> How:
+        """Everywhere, if one of the methods looks at more than the surroundings of what is measured in a scene."""
         kinds = [measure.ESTIMATORS[each.locator] for each in methods]
+        kinds = kinds if of is None else [each.within(of) for each in kinds]
         return replace(
             self,
             everywhere=not all(each.local for each in kinds),

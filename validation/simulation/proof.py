@@ -103,7 +103,7 @@ def independent(
     propagated : tuple of PropagatedValues
         What `measure.propagate` says of their mean, by method.
     """
-    how = how.by(*methods).gathering
+    how = how.by(*methods, of=picture.scene).gathering
     images = completed(picture, renders.others, renders.measured, how)
     more, found = [cache(each) for each in Shown(picture, how, images).more_telling(images)], []
     for each, told in zip(methods, propagated, strict=True):
