@@ -22,9 +22,9 @@ from render import variant as variants
 from render.adaptive import bent, crossed, dilated, refine
 from render.between import edges_of, lent_to
 from render.build import CUSTOM, MANY_WAYS, description, textured, view
-from render.even import Even, some_of
+from render.even import Even, fine_of, some_of
 from render.gathered import Gathering
-from render.large import Counts, Renders, fine_pixels, is_large, whole_pixels
+from render.large import Counts, Renders, bounced, fine_pixels, is_large, whole_pixels
 from render.modelled import Modelled
 from render.mosaic import Tiles
 from render.parts import Part
@@ -267,7 +267,14 @@ class _Tracer:
             return self._tiles(loaded, active, count, k).rendered(pixels, where, count, (self.quality.seed, 4))
         return refine(loaded, self.rays(active), pixels, where, count)
 
-    def bounced(self, near: np.ndarray, count: int) -> np.ndarray:
+    def _bounced(self) -> Callable[[np.ndarray, np.ndarray, int], np.ndarray]:
+        """What makes light between surfaces where pictures are compared: patches without noise, or random rays."""
+        k = self.quality.supersample
+        if self.modelled is not None and self.modelled.tells_between:
+            return lambda near, *_: self.modelled.between(fine_of(near, k), 1)
+        return lambda *asked: fine_of(bounced(self.with_less_without, *asked), k)
+
+    def with_less_without(self, near: np.ndarray, count: int) -> np.ndarray:
         """What surfaces send to each other: with it less without it, of the same rays; whole pixels."""
         pixels, count = np.zeros(near.shape), 1 << math.ceil(math.log2(count))
 
@@ -290,7 +297,7 @@ class _Tracer:
             k,
             self.random,
             self.quality.everywhere,
-            self.bounced if apart and between else None,
+            self._bounced() if apart and between else None,
             self._even() if between and plane else None,
             self.quality.alike,
         )

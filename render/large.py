@@ -47,8 +47,8 @@ class Renders:
     everywhere : bool
         Whether pixels that nothing is measured by are rendered, too; else they are dark.
     bounced : callable, optional
-        (mask of whole pixels, rays) to the image of whole pixels of what surfaces send to each other, 0 elsewhere:
-        where that alone is random and is to be added to the direct light.
+        (mask of whole pixels, mask of those whose noise moves an edge, rays) to the image of fine pixels of what
+        surfaces send to each other, 0 elsewhere: where that alone is random and is to be added to the direct light.
     even : Even, optional
         Where what is random is light that plane faces send to each other.
     alike : bool
@@ -61,7 +61,7 @@ class Renders:
     supersample: int
     random: bool
     everywhere: bool = True
-    bounced: Callable[[np.ndarray, int], np.ndarray] | None = None
+    bounced: Callable[[np.ndarray, np.ndarray, int], np.ndarray] | None = None
     even: Even | None = None
     alike: bool = False
 
@@ -116,7 +116,7 @@ def fine_pixels(
             near, moving = np.ones_like(near), np.ones_like(moving)
         if renders.even is not None:
             near = renders.even.lent_to(near)
-        return direct + fine_of(_bounced(renders.bounced, near, moving, few), k)
+        return direct + renders.bounced(near, moving, few)
     if renders.everywhere:
         first = renders.whole(False, ordinary)
         fine, divided, asked = fine_of(first, k), fine_of(crossed(first, math.ceil(reach / k)) | near, k), None
@@ -163,10 +163,13 @@ def _by_light(where: np.ndarray, lent: np.ndarray | None) -> list[tuple[bool, np
     return [(True, where)] if lent is None else [(False, where & ~lent), (True, where & lent)]
 
 
-def _bounced(
+def bounced(
     made: Callable[[np.ndarray, int], np.ndarray], near: np.ndarray, moving: np.ndarray, rays: int
 ) -> np.ndarray:
-    """What surfaces send to each other, image of whole pixels: ``rays`` where there is any and it moves an edge."""
+    """What surfaces send to each other, image of whole pixels: ``rays`` where there is any and it moves an edge.
+
+    ``made`` takes a mask of whole pixels and rays.
+    """
     light = made(near, _PILOT)
     lit = dilated(light > 0, 2 * _AROUND + 1) & near & moving
     return np.where(lit, made(lit, rays), light)

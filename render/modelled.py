@@ -1,29 +1,28 @@
-"""Direct light in fine pixels as the image model has it, where pictures from one place are compared.
+"""Light in fine pixels as the image model has it, where pictures from one place are compared.
 
 What lines of sight meet is the same whatever the light, and is looked for once: under another light only shadows are.
+Light between faces, where patches tell it, has none of the noise of a difference of random rays.
 """
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
 
 from imaging.geometry.lens import image_centre
 from imaging.light.behind import Met, direct_light, met_at
+from imaging.light.between import light_between
 from imaging.light.emitters import is_point
 from imaging.pictures import Pictures
-from scenes import Camera, Floor, Picture, Pose, Solid
+from imaging.threads import each
+from render.build import MANY_WAYS
+from render.gathered import is_gathered
+from scenes import Camera, Floor, Picture, Pose, Scene, Solid
 
 _AT_ONCE = 1 << 14  # rays whose temporary arrays stay near to the processor
-_WORKERS = min(os.cpu_count() or 1, 4)  # threads, of NumPy and Embree alone: the renderer has its own
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class View:
 
     def met(self, pixels: np.ndarray, samples: int) -> Met:
         """By rays of fine pixels (n,), numbered row by row: a square number of each, in a grid; (n samples)."""
-        parts = _each(lambda part: self._met(pixels[part], math.isqrt(samples)), len(pixels), _AT_ONCE // samples)
+        parts = each(lambda part: self._met(pixels[part], math.isqrt(samples)), len(pixels), _AT_ONCE // samples)
         return Met(*map(np.concatenate, zip(*parts, strict=True)))
 
     def _met(self, pixels: np.ndarray, side: int) -> Met:
@@ -101,14 +100,6 @@ def _some(met: Met, which: np.ndarray, samples: int) -> Met:
     return Met(faces.take(which, 0).ravel(), points.take(which, 0).reshape(-1, 3))
 
 
-def _each(made: Callable[[slice], T], count: int, size: int) -> list[T]:
-    """What is made of some of so many at a time, on all processor cores."""
-    size = max(size, 1)
-    parts = [slice(at, at + size) for at in range(0, count, size)]
-    with ThreadPoolExecutor(_WORKERS) as pool:
-        return list(pool.map(made, parts))
-
-
 _looked = lru_cache(maxsize=1)(Looked)  # pictures that are compared follow each other
 
 
@@ -117,9 +108,20 @@ def forget() -> None:
     _looked.cache_clear()
 
 
+def is_told(picture: Picture, active: frozenset[str]) -> bool:
+    """Whether the image model has all light of some effects as a render has it: nothing of it is random."""
+    return _is_bare(picture.scene) and active & MANY_WAYS <= {"interreflection"} and is_gathered(picture.scene)
+
+
+def _is_bare(scene: Scene) -> bool:
+    """Whether surfaces and lights are as a render has them, point by point."""
+    round_or_printed = scene.solid.curved or scene.textures or scene.placement.board is not None
+    return not round_or_printed and is_point(scene.lights)
+
+
 @dataclass(frozen=True, eq=False)
 class Modelled:
-    """Direct light of one picture.
+    """Light of one picture.
 
     Attributes
     ----------
@@ -135,10 +137,28 @@ class Modelled:
     def of(cls, picture: Picture, supersample: int, start: tuple[int, int], width: int) -> Modelled | None:
         """None where surfaces or a light of the model are not as a render has them, point by point."""
         scene = picture.scene
-        if scene.solid.curved or scene.textures or scene.placement.board is not None or not is_point(scene.lights):
+        if not _is_bare(scene):
             return None
         view = View(scene.bodies, scene.bright_floor, scene.camera, picture.sensor, supersample, start, width)
         return cls(Pictures.of(picture), view)
+
+    @property
+    def tells_between(self) -> bool:
+        """Whether light that surfaces send to each other, too."""
+        return is_gathered(self.pictures.scene)
+
+    def between(self, marked: np.ndarray, samples: int) -> np.ndarray:
+        """What surfaces send to each other in marked fine pixels, each the mean of so many rays, 0 elsewhere."""
+        found = np.zeros(marked.shape)
+        met = _looked(self.view).met(np.flatnonzero(marked), samples)
+        light = each(lambda part: self._between(*(some[part] for some in met)), len(met.faces), _AT_ONCE)
+        found[marked] = np.concatenate([np.zeros(0), *light]).reshape(-1, samples).mean(1)
+        return found
+
+    def _between(self, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
+        found, some = np.zeros(faces.size), np.flatnonzero(faces >= 0)
+        found[some] = light_between(self.pictures, points[some], faces[some])
+        return found
 
     def rendered(self, fine: np.ndarray, marked: np.ndarray, samples: int) -> np.ndarray:
         """The image itself, its marked fine pixels anew, each the mean of so many rays, a square number."""
@@ -146,6 +166,6 @@ class Modelled:
         if not where.size:
             return fine
         faces, points = _looked(self.view).met(where, samples)
-        light = _each(lambda part: direct_light(self.pictures, Met(faces[part], points[part])), len(faces), _AT_ONCE)
+        light = each(lambda part: direct_light(self.pictures, Met(faces[part], points[part])), len(faces), _AT_ONCE)
         fine.flat[where] = np.concatenate(light).reshape(-1, samples).mean(1)
         return fine

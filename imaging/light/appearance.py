@@ -7,6 +7,8 @@ beside edges says `imaging.light.edge_sides`, along lines of sight `imaging.ligh
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from imaging.geometry.projection import camera_frame
@@ -16,7 +18,7 @@ from imaging.light.illumination import dimming
 from imaging.light.irradiance import bands, beam, electric_field, widened
 from imaging.light.sheets import printed
 from imaging.pictures import Pictures
-from scenes import Brdf, Scene
+from scenes import Brdf, Floor, Material, Scene
 from scenes.materials.vectors import length
 from scenes.parts.shading import normals_at
 
@@ -158,3 +160,9 @@ def polarisation_axis(scene: Scene, which: int, light_at: np.ndarray) -> np.ndar
 def unit(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) of length 1."""
     return vectors / length(vectors)[..., None]
+
+
+@lru_cache(maxsize=64)
+def floor_material(floor: Floor) -> Material:
+    """The floor's surface: diffuse."""
+    return Material(diffuse_reflectance=floor.reflectance)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from imaging.geometry.projection import ray_origins, rays
 from imaging.geometry.rays import Own, first_face, reaches
-from imaging.light.appearance import analyser_axis, face_signal, signal, unit
+from imaging.light.appearance import analyser_axis, face_signal, floor_material, signal, unit
 from imaging.light.backlight import backlights, backlit
 from imaging.light.between import light_between
 from imaging.pictures import Pictures
-from scenes import Camera, Floor, Material, Solid
+from scenes import Camera, Floor, Solid
 from scenes.materials.vectors import chosen
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -167,12 +167,6 @@ def _is_free(bodies: Solid, points: np.ndarray, _: np.ndarray, light: np.ndarray
     """Whether places (..., 3) of the floor see a position, bool (...)."""
     blocker, t = first_face(bodies, light, points + 1e-7 * bodies.extent * _UP - light, ())
     return (blocker < 0) | (t >= 1)
-
-
-@lru_cache(maxsize=64)
-def floor_material(floor: Floor) -> Material:
-    """The floor's surface: diffuse."""
-    return Material(diffuse_reflectance=floor.reflectance)
 
 
 def _met(bodies, points, vectors, wanted, own) -> tuple[np.ndarray, np.ndarray]:

@@ -9,11 +9,11 @@ import numpy as np
 
 from imaging.light.bore import Bore, alone, bores, light_in_bore, place_in
 from imaging.light.emitters import Emitter, emitters, plain
-from imaging.light.exchanged import Exchanged, exchanged, once_reflected
+from imaging.light.exchanged import Exchanged, exchanged, once_reflected, white_of
 from imaging.light.illumination import dimming_of_one
 from imaging.light.irradiance import beam
 from imaging.pictures import Pictures
-from scenes import Material, Scene, Solid
+from scenes import Scene, Solid
 from scenes.lights import GLANCE
 
 if TYPE_CHECKING:
@@ -42,11 +42,8 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
     others = ~np.isin(faces, _walls(scene.solid))
     if lent is not None and others.any():
         found[others] = lent.at(points[others], faces[others])
-    analysed = scene.camera.analyser_deg is not None
-    white = np.array([material.diffuse(analysed) for material in scene.surfaces.materials])
-    below = Material(diffuse_reflectance=0.0 if scene.bright_floor is None else scene.bright_floor.reflectance)
-    white = np.append(white[scene.surfaces.kinds], below.diffuse(analysed))
-    found = scene.camera.exposure * white[faces] * np.where(asked, found, 0.0)
+    white = white_of(scene, faces, analysed=scene.camera.analyser_deg is not None)
+    found = scene.camera.exposure * white * np.where(asked, found, 0.0)
     return found * dimming_of_one(pictures, points)
 
 

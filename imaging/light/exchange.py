@@ -25,6 +25,7 @@ from imaging.light.kept import kept
 from imaging.light.nodes import Frame, along, frame_of, goes_on, onto
 from imaging.light.places import Places, areas_of, in_unit_square, shift_of, shifts, ways_about
 from imaging.light.walls import Wall, wall
+from imaging.threads import each
 from scenes import Circle, Floor, Solid
 from scenes.parts.shading import normals_at
 from scenes.parts.solid import assembled
@@ -40,13 +41,14 @@ _FROM_NODE, _FROM_SMALL = 1024, 256  # rays, the latter on a plane face that is 
 _FROM_RIM = 4096  # of a node beside a measured rim
 _FROM_WALL = 1024  # of a curved surface all of whose facets are told together
 _ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly, by patches of a cell
-_NODES = 160  # of the whole body; nodes on a face that is asked for stand so dense
+_NODES = 160  # of the whole body; nodes on a face that is asked for stand so dense,
+_DENSER, _FROM_DENSE = 3, 512  # times denser each way on a plane one, across which shadows end, and rays from there
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
 _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; beyond it is like the nearest of them
-_FLOOR_CELLS = 400  # of it, besides those of the bodies
+_FLOOR_CELLS = 900  # of it, besides those of the bodies
 _UP = 1 - 1e-9  # cosine of a normal that sees no floor
-AT_ONCE = 200_000  # rays
+AT_ONCE = 1 << 15  # rays
 _NUMBER = np.int32  # of what rays meet there are millions, which are kept
 LIFT = 1e-6  # of the object's size: between a place and its own face
 MARGIN = 1e-6  # of the object's size: what passes an edge more closely is decided in double precision
@@ -173,13 +175,13 @@ class Exchange:
 
         Others where the unit square that they stand for is ``shifted`` otherwise, (2,) or (n, 2).
         """
-        size, shifted = max(1, AT_ONCE // rays), np.broadcast_to(shifted, (len(points), 2))
-        parts = []
-        for at in range(0, len(points), size):
-            part = slice(at, at + size)
+        shifted = np.broadcast_to(shifted, (len(points), 2))
+
+        def of(part: slice) -> Hits:
             found = self._met(points[part], normals[part], (in_unit_square(rays) + shifted[part, None]) % 1.0, but)
-            parts.append(found._replace(starts=found.starts + at))
-        return Hits(*map(np.concatenate, zip(*parts, strict=True)))
+            return found._replace(starts=found.starts + part.start)
+
+        return Hits(*map(np.concatenate, zip(*each(of, len(points), AT_ONCE // rays), strict=True)))
 
     def _met(self, points: np.ndarray, normals: np.ndarray, square: np.ndarray, but: tuple[int, ...]) -> Hits:
         ways = ways_about(normals, square)
@@ -193,7 +195,7 @@ class Exchange:
         face, t = face[point, ray], t[point, ray]
         places = starts[point, ray] + t[:, None] * ways[point, ray]
         _, patch = self.nearest(places, self.solid.normals[face])
-        point, ray, face, patch = (each.astype(_NUMBER) for each in (point, ray, face, patch))
+        point, ray, face, patch = (numbers.astype(_NUMBER) for numbers in (point, ray, face, patch))
         return Hits(point, ray, places, face, patch)
 
     def nearest(self, points: np.ndarray, normals: np.ndarray, count: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -324,18 +326,18 @@ def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray
 
     Those on its rim stand a little within, for in an inner edge light comes from both sides.
     """
-    solid, cell = exchange.solid, _apart(exchange)
-    frame, facet = frame_of(solid, face), not solid.plane[face]
+    solid, facet = exchange.solid, not exchange.solid.plane[face]
+    frame, cell = frame_of(solid, face), _apart(exchange) / (1 if facet or exchange.roughly else _DENSER)
     u, v = (along(*each, cell) for each in zip(frame.size, goes_on(solid, face, frame), strict=True))
     within = [_WITHIN * n[n > 0][0] for n in (u, v)]
     a, b = (np.clip(n, w, size - w) for n, w, size in zip((u, v), within, frame.size, strict=True))
     nodes = (frame.corner + a[:, None, None] * frame.sides[0] + b[:, None] * frame.sides[1]).reshape(-1, 3)
     nodes = onto(solid, face, nodes, min(within))
-    rays = _FROM_SMALL if not facet and (frame.size < cell).any() else _FROM_NODE
+    rays = _FROM_NODE if facet else _FROM_SMALL if (frame.size < _apart(exchange)).any() else _FROM_DENSE
     rays = _ROUGH_NODE if exchange.roughly else rays
-    shift = shift_of(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
+    shifted = shift_of(face + 1) if facet else shifts(len(nodes))  # what one is told wrongly the next ones are not
     sheet = Sheet(frame, u, v, NOTHING_MET, rays)
-    return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shift, (len(nodes), 2))
+    return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shifted, (len(nodes), 2))
 
 
 def _nodes_beside(exchange: Exchange, annulus: Annulus) -> tuple[Sheet, np.ndarray, np.ndarray, np.ndarray]:

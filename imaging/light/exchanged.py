@@ -18,6 +18,7 @@ import numpy as np
 
 from imaging.geometry.rays import first_face
 from imaging.light.annulus import Annulus, measured_rims
+from imaging.light.appearance import floor_material
 from imaging.light.emitters import Emitter
 from imaging.light.exchange import AT_ONCE, LIFT, MARGIN, NOT_TOLD, Exchange, Hits, Sheet, exchange_of, sheets
 from imaging.light.irradiance import beam
@@ -25,6 +26,7 @@ from imaging.light.kept import kept
 from imaging.light.nodes import Frame
 from imaging.light.places import in_unit_square, middles_of, shifts, ways_about
 from imaging.light.walls import Wall
+from imaging.threads import each
 from scenes import Scene, Solid
 from scenes.parts.shading import normals_at
 
@@ -100,7 +102,7 @@ class Exchanged:
             here = some[at : at + size]
             normals = normals_at(exchange.solid, faces[here], points[here])
             met = exchange.met(points[here], normals, _FROM_PIECE, shifted[at : at + size])
-            found[here] = _white(self.scene, faces[here]) * self.gathered(met, len(here), _FROM_PIECE)
+            found[here] = white_of(self.scene, faces[here]) * self.gathered(met, len(here), _FROM_PIECE)
         return found
 
     def gathered(self, met: Hits, count: int, rays: int | np.ndarray) -> np.ndarray:
@@ -109,7 +111,7 @@ class Exchanged:
         Of several emitters each is asked for every so manieth ray.
         """
         direct = _direct(self.scene, self.emitters, self.exchange.solid, met)
-        sent = _white(self.scene, met.faces) * (direct + self.arriving[met.patches])
+        sent = white_of(self.scene, met.faces) * (direct + self.arriving[met.patches])
         return np.bincount(met.starts, sent, count) / rays
 
 
@@ -161,7 +163,7 @@ def _spline(sheet: Sheet, values: np.ndarray) -> Told:
     return Told(sheet.frame, RectBivariateSpline(*places, values, kx=along, ky=across))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)  # a picture, and as many with an input moved
 def exchanged(
     scene: Scene, emitters: tuple[Emitter, ...], roughly: bool = False, without: tuple[int, ...] = ()
 ) -> Exchanged | None:
@@ -172,8 +174,8 @@ def exchanged(
         return None
     met = exchange.seen
     several = met._replace(rays=np.arange(len(met.rays)))  # of few rays from a place no emitter is asked for none
-    lit = _white(scene, met.faces) * _direct(scene, emitters, exchange.solid, several)
-    whites = exchange.of_patches(_white(scene, exchange.places.faces))
+    lit = white_of(scene, met.faces) * _direct(scene, emitters, exchange.solid, several)
+    whites = exchange.of_patches(white_of(scene, exchange.places.faces))
     once = exchange.of_patches(np.bincount(met.starts, lit, len(exchange.patches)) / exchange.rays)
     arriving = more = once
     for _ in range(_BOUNCES):
@@ -197,23 +199,26 @@ def once_reflected(
     face, t = first_face(bodies, starts, ways, own)
     point, ray = np.nonzero(face >= 0)
     met, faces = starts[point, ray] + t[point, ray, None] * ways[point, ray], face[point, ray]
-    lit = sum(_arriving(scene, each, met, normals_at(bodies, faces, met)) for each in emitters)
-    return np.bincount(point, _white(scene, faces) * lit, len(points)) / _REFLECTED
+    lit = sum(_arriving(scene, emitter, met, normals_at(bodies, faces, met)) for emitter in emitters)
+    return np.bincount(point, white_of(scene, faces) * lit, len(points)) / _REFLECTED
 
 
-def _white(scene: Scene, faces: np.ndarray) -> np.ndarray:
-    """Diffuse reflectance of faces (n,)."""
-    white = np.array([material.diffuse() for material in scene.surfaces.materials])[scene.surfaces.kinds]
-    return np.append(white, 0.0 if scene.floor is None else scene.floor.reflectance)[faces]
+def white_of(scene: Scene, faces: np.ndarray, *, analysed: bool = False) -> np.ndarray:
+    """Diffuse reflectance of faces (...), the floor's number after the last of the bodies'; before an analyser half of
+    it."""
+    floor = scene.bright_floor
+    materials = *scene.surfaces.materials, *(() if floor is None else (floor_material(floor),))
+    white = np.array([material.diffuse(analysed) for material in materials] + [0.0])
+    return white[np.append(scene.surfaces.kinds, len(scene.surfaces.materials))][faces]
 
 
 def _direct(scene: Scene, emitters: tuple[Emitter, ...], solid: Solid, met: Hits) -> np.ndarray:
     """Irradiance from emitters where rays end, (k,); of several each is asked for every so manieth ray."""
-    found = np.zeros(len(met.points))
-    for at in range(0, len(found), AT_ONCE):  # in blocks, which bounds the memory
-        part = slice(at, at + AT_ONCE)
-        found[part] = _direct_of_few(scene, emitters, solid, Hits(*(each[part] for each in met)))
-    return found
+
+    def of(part: slice) -> np.ndarray:
+        return _direct_of_few(scene, emitters, solid, Hits(*(values[part] for values in met)))
+
+    return np.concatenate([np.zeros(0), *each(of, len(met.points), AT_ONCE)])  # in blocks, which bounds the memory
 
 
 def _direct_of_few(scene: Scene, emitters: tuple[Emitter, ...], solid: Solid, met: Hits) -> np.ndarray:

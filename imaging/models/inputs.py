@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,6 +52,22 @@ def with_lights_moved(picture: Picture, times: float = 1.0) -> Iterator[Picture]
         yield picture.with_scene(_with_light(picture.scene, i, light.tried(distance=(1 + step) * light.distance)))
         for pose in _beside(picture.lights[i], step):
             yield replace(picture, lights=(*picture.lights[:i], pose, *picture.lights[i + 1 :]))
+
+
+class Moved(NamedTuple):
+    """A picture with one input moved by so many standard uncertainties, and the other way."""
+
+    one: Picture
+    other: Picture
+    times: float
+    of_surfaces: bool
+
+
+def both_ways(picture: Picture) -> Iterator[Moved]:
+    """The picture with each input moved: materials, the floor, and lights as far as they may stand."""
+    for others, times in ((of_other_surfaces, 1.0), (with_lights_moved, LIMIT)):
+        for one, other in zip(others(picture, times), others(picture, -times), strict=True):
+            yield Moved(one, other, times, others is of_other_surfaces)
 
 
 def u_of(told) -> float:

@@ -7,7 +7,6 @@ otherwise or a light stands elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,7 +15,7 @@ import numpy as np
 from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project_ideal
 from imaging.light.behind import seen_at
-from imaging.models.inputs import LIMIT, of_other_surfaces, with_lights_moved
+from imaging.models.inputs import both_ways
 from imaging.pictures import Pictures
 from imaging.sensor import recorded
 from scenes import Picture
@@ -51,7 +50,7 @@ class EdgeLevels(NamedTuple):
     @property
     def middles(self) -> np.ndarray:
         """Of the cells, px, shape (m, T)."""
-        return (self.ends[:, 1:] + self.ends[:, :-1]) / 2
+        return middles(self.ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +73,18 @@ class SceneLevels:
         pitch = max(1.0, length / _ROWS)
         along = np.arange(-2.0, length / pitch + 2.0) * pitch
         ends = _ends(along.size, half_width)
-        middles, normal = (ends[:, 1:] + ends[:, :-1]) / 2, np.array([-direction[1], direction[0]])
-        places = (start + along[:, None, None] * direction + middles[..., None] * normal).reshape(-1, 2)
-        steps = ((_levels(one, places) - _levels(other, places)) / (2 * times) for one, other, times in _pairs(picture))
-        changed = np.array([step.reshape(middles.shape) for step in steps]).reshape(-1, *middles.shape)
-        return EdgeLevels(along, ends, _levels(picture, places).reshape(middles.shape), changed)
+        across, normal = middles(ends), np.array([-direction[1], direction[0]])
+        places = (start + along[:, None, None] * direction + across[..., None] * normal).reshape(-1, 2)
+        steps = (
+            (_levels(each.one, places) - _levels(each.other, places)) / (2 * each.times) for each in both_ways(picture)
+        )
+        changed = np.array([step.reshape(across.shape) for step in steps]).reshape(-1, *across.shape)
+        return EdgeLevels(along, ends, _levels(picture, places).reshape(across.shape), changed)
+
+
+def middles(ends: np.ndarray) -> np.ndarray:
+    """Of cells (m, T) whose ends are (m, T + 1)."""
+    return (ends[:, 1:] + ends[:, :-1]) / 2
 
 
 def _ends(rows: int, half_width: float) -> np.ndarray:
@@ -87,13 +93,6 @@ def _ends(rows: int, half_width: float) -> np.ndarray:
     first = _STEP * np.stack([(np.arange(1, rows + 1) * _GOLDEN + part) % 1.0 for part in (0.0, 0.5)], 1)
     below, above = (first[:, [k]] + cells for k in (0, 1))
     return np.concatenate([-below[:, ::-1], np.zeros((rows, 1)), above], 1)
-
-
-def _pairs(picture: Picture) -> Iterator[tuple[Picture, Picture, float]]:
-    """The picture with each input moved both ways, and by how many standard uncertainties."""
-    for others, times in ((of_other_surfaces, 1.0), (with_lights_moved, LIMIT)):
-        for one, other in zip(others(picture, times), others(picture, -times), strict=True):
-            yield one, other, times
 
 
 def _levels(picture: Picture, places: np.ndarray) -> np.ndarray:

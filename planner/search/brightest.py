@@ -17,8 +17,7 @@ import numpy as np
 
 from imaging.features.locator import MIN_CONTRAST
 from imaging.geometry.visibility import hidden_spans, longest_span, turned
-from imaging.light.appearance import is_separable
-from imaging.light.behind import floor_material
+from imaging.light.appearance import floor_material, is_separable
 from imaging.light.edge_sides import whites
 from imaging.light.sheets import printed
 from imaging.models.strong import ROUGH

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imaging.features.projected_edges import circles
-from imaging.light.appearance import signal
-from imaging.light.behind import floor_material
+from imaging.light.appearance import floor_material, signal
 from imaging.pictures import Pictures
 from render.phenomena.base import EVERYTHING, NOTHING, Effect, Influence
 from render.phenomena.edges import added_light, background, near_steps, sides

@@ -1,4 +1,4 @@
-"""Direct light of pictures that are compared, by the image model instead of the renderer's rays: `render.modelled`."""
+"""Light of pictures that are compared, by the image model instead of the renderer's rays: `render.modelled`."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ import pytest
 import render
 import scenes
 from imaging.light.behind import Met
+from imaging.models.inputs import of_other_surfaces
 from render import modelled
 from render.surroundings import near_required
 from scenes import Picture, Pose
@@ -44,6 +45,35 @@ def test_the_image_model_draws_direct_light_as_rays_do(name, setting, monkeypatc
     assert np.sqrt(np.square(told - rendered).mean()) < 0.13  # measured: 0.062 on `bracket`, 0.008 elsewhere
     assert told == pytest.approx(rendered, abs=2.0)  # measured: 0.96 on `bracket`, 0.13 elsewhere
     assert abs(np.median(told - rendered)) < 1e-5  # single precision: 6e-7
+
+
+@pytest.mark.parametrize(("name", "setting"), [("bracket", 0), ("grey_floor", 2), ("bracket_mm", 0)])
+def test_patches_tell_what_faces_send_to_each_other_as_random_rays_do(name, setting, monkeypatch):
+    """Beside inner edges, on a floor in a part's shadow, in bores: in all, and what is left of darker faces."""
+    here = picture(name, setting)
+    here = here.with_scene(here.scene.tried(camera=_smaller(here.scene.camera)))
+    camera, dimmed = here.scene.camera, next(of_other_surfaces(here))
+    near = near_required(here, (slice(0, camera.height), slice(0, camera.width)), 1, 2.0)
+
+    def between(shown):
+        with_it = render.image(shown, quality=replace(FEW, random_samples=64), variant="scalar_rgb")
+        return (with_it - direct(shown))[near].mean()
+
+    told, left = between(here), between(dimmed)
+    with monkeypatch.context() as changed:
+        changed.setattr(modelled.Modelled, "tells_between", False)
+        by_rays, less = between(here), between(dimmed)
+    assert by_rays > 1.0  # levels; margin: there is some
+    assert told == pytest.approx(by_rays, rel=0.1)  # measured: 0.034 on `grey_floor`, 0.017 elsewhere
+    assert left / told == pytest.approx(less / by_rays, abs=0.01)
+
+
+def _smaller(camera):
+    """As a camera of fewer pixels sees it: the same, if it has few."""
+    part = min(1.0, 320 / camera.width)
+    return camera.tried(
+        width=round(part * camera.width), height=round(part * camera.height), focal_px=part * camera.focal_px
+    )
 
 
 def test_rays_that_pictures_share_are_traced_once(monkeypatch):

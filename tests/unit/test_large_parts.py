@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from render import large
-from render.even import Even
+from render.even import Even, fine_of
 from render.large import Counts, Renders, fine_pixels, is_large
 
 K, SIZE, RAYS = 2, (40, 50), Counts(4, 16, 16, 256)
@@ -68,12 +68,15 @@ def test_bounced_light_is_added_to_direct_light_in_whole_pixels(monkeypatch):
         asked.append(rays)
         return np.where(marked, sent, 0.0)
 
+    def in_fine_pixels(*asked):
+        return fine_of(large.bounced(bounced, *asked), K)
+
     def again(is_random, fine, marked, rays):
         assert not is_random, "direct light alone"
         return np.where(marked, direct, fine)
 
     whole = direct.reshape(SIZE[0], K, SIZE[1], K).mean((1, 3))
-    renders = Renders(lambda is_random, rays: whole, again, K, True, False, bounced)
+    renders = Renders(lambda is_random, rays: whole, again, K, True, False, in_fine_pixels)
     found = fine_pixels(None, None, renders, 0, RAYS)
     seen = near.repeat(K, 0).repeat(K, 1)
     assert found == pytest.approx(np.where(seen, direct, 0.0) + sent.repeat(K, 0).repeat(K, 1))

@@ -623,10 +623,18 @@ def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("u", "below", "asked"), [(0.9, True, []), (1.1, True, ["overall", "settled"]), (1.1, False, [])]
+    ("u", "below", "random", "asked"),
+    [
+        (0.9, True, True, []),
+        (1.1, True, True, ["overall", "settled"]),
+        (1.1, True, False, ["overall"]),
+        (1.1, False, True, []),
+    ],
 )
-def test_more_is_rendered_where_a_bias_is_not_known_well_enough(picture, u, below, asked, monkeypatch):
-    """u(bias) a tenth below what is allowed is `ok`, above `clutter` until more tells; not above a megapixel."""
+def test_more_is_rendered_where_a_bias_is_not_known_well_enough(picture, u, below, random, asked, monkeypatch):
+    """u(bias) a tenth below what is allowed is `ok`, above `clutter` until more tells; not above a megapixel, and no
+    other rays where those that are compared have no noise."""
+    monkeypatch.setattr(corrections, "is_random", lambda *given: random)
     made, done = _made(picture), []
     limit = allowed(float(made.sigma[0]))
     sources = {"rendering": np.array([0.0]), "light_place": np.array([u * limit])}
@@ -649,6 +657,7 @@ def test_methods_that_are_judged_together_share_what_settles_them(picture, monke
         _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])}) for u in (9.0, 0.1)
     )
     monkeypatch.setattr(proof, "completed", lambda *given: ROUGH)
+    monkeypatch.setattr(corrections, "is_random", lambda *given: True)
     monkeypatch.setattr(corrections, "of_all", lambda *given: made.append("overall"))
     monkeypatch.setattr(corrections, "settled", lambda *given: made.append("settled") or fine)
     monkeypatch.setattr(measure, "correction", lambda images, *given: sure if images.changed else doubtful)

@@ -27,7 +27,7 @@ from scenes import Picture, Scene
 from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, MISFIT, OK, SIGN_CHANGE, is_trusted
 from validation.remeasured import Method
 from validation.simulation.how import How, is_below
-from validation.simulation.images import completed, of_all, settled
+from validation.simulation.images import completed, is_random, of_all, settled
 
 _PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
 _ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
@@ -152,10 +152,10 @@ class Shown:
 
     def more_telling(self, images: Images) -> list[Callable[[], Images]]:
         """What tells of inputs that images do not know well enough, the quickest first."""
-        return [
-            lambda: replace(images, overall=self._overall()),
-            lambda: replace(images, changed=self._settled(), overall=self._overall()),
-        ]
+        more = [lambda: replace(images, overall=self._overall())]
+        if is_random(self.picture, self.how):
+            more.append(lambda: replace(images, changed=self._settled(), overall=self._overall()))
+        return more
 
 
 def _until_quiet(

@@ -14,7 +14,7 @@ brighter or darker as a whole, which moves nothing, is not told by few rays but 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 
@@ -25,7 +25,7 @@ import measure
 from imaging.blurred.whole import image as drawn
 from imaging.blurred.whole import is_drawable
 from imaging.colour import seen
-from imaging.models.inputs import LIMIT, of_other_surfaces, u_of, with_lights_moved
+from imaging.models.inputs import Moved, both_ways, u_of
 from measure import Images
 from render import modelled
 from render.build import MANY_WAYS
@@ -51,15 +51,16 @@ def completed(
     """With the images, or numbers, of what the scene is not sure of."""
     first, known, alike, active = renders[0], of_unknown_kinds(picture), how.compared(picture), how.active(picture)
     lines: dict[str, np.ndarray] = {}
+    moved = {which: [each for each in both_ways(picture) if each.of_surfaces is which] for which in (True, False)}
     direct, whole, dimmed = cache(partial(alike.direct, active=active)), cache(alike.image), None
     if active & MANY_WAYS == {BETWEEN} and not is_below(picture, LARGE):
         dimmed = of_one_surface(picture, renders, partial(direct, picture), u_of(picture.scene.uncertainty.reflectance))
     if dimmed is not None:
         changed = {REFLECTANCE: dimmed}
     elif is_below(picture, LARGE):
-        changed = {REFLECTANCE: _both_ways(first, whole, of_other_surfaces, picture)}
+        changed = {REFLECTANCE: _both_ways(first, whole, moved[True], picture)}
     else:
-        changed = {REFLECTANCE: _steps(first, whole, of_other_surfaces(picture), picture)}
+        changed = {REFLECTANCE: _steps(first, whole, [each.one for each in moved[True]], picture)}
     in_closed_form = light_in_closed_form(picture, how)
     if in_closed_form is not None:
         known |= {LIGHT: in_closed_form}
@@ -69,7 +70,7 @@ def completed(
         drawing = cache(partial(drawn, where=_read(picture, how)))
         rendered = whole if is_below(picture, LARGE) else direct
         made = drawing if _is_drawn(picture, first, drawing) else rendered
-        changed[LIGHT] = _both_ways(first, made, with_lights_moved, picture, LIMIT)
+        changed[LIGHT] = _both_ways(first, made, moved[False], picture)
     modelled.forget()
     changed = {name: some for name, some in changed.items() if some.shape[0]}
     return Images(renders, changed, beside, known, lines, how.by_pixel)
@@ -93,16 +94,20 @@ def _is_drawn(picture: Picture, render: np.ndarray, drawing: Callable[[Picture],
 def of_all(picture: Picture, images: Images, how: How) -> np.ndarray:
     """Images of all of a picture, as `measure.Images` has them, with what others of it have changed."""
     how, sets = replace(how, quality=replace(how.quality, **_OVERALL), everywhere=True), []
-    pairs = [(pair, 1.0) for pair in _pairs(of_other_surfaces, picture)]
-    pairs += [(pair, LIMIT) for pair in _pairs(with_lights_moved, picture, LIMIT) if LIGHT in images.changed]
+    moved = [each for each in both_ways(picture) if each.of_surfaces or LIGHT in images.changed]
     for seed in range(2):
         alike = replace(how, quality=replace(how.quality, alike=True, seed=how.quality.seed + seed))
         levels = replace(how, quality=replace(how.quality, random_samples=_LEVELS))
         here = alike.image(picture)
-        steps = (here + (alike.image(one) - alike.image(other)) / (2 * times) for (one, other), times in pairs)
+        steps = (here + (alike.image(one) - alike.image(other)) / (2 * times) for one, other, times, _ in moved)
         told = (image for step in steps for image in (step, here))  # of what is bent no block is asked
         sets.append([levels.image(picture, seed), here, *told])
     return np.array(sets)
+
+
+def is_random(picture: Picture, how: How) -> bool:
+    """Whether rays that are compared have noise: they have none where the image model tells all light."""
+    return how.everywhere or not (how.by_pixel and modelled.is_told(picture, how.active(picture)))
 
 
 def settled(picture: Picture, images: Images, how: How) -> Images:
@@ -116,23 +121,15 @@ def settled(picture: Picture, images: Images, how: How) -> Images:
     return replace(images, changed={name: sum(each[name] for each in sets) / len(sets) for name in images.changed})
 
 
-def _pairs(others: Callable[[Picture, float], Iterable[Picture]], picture: Picture, times: float = 1.0) -> Iterable:
-    """What an input moved by so many standard uncertainties makes of a picture, and the other way."""
-    return zip(others(picture, times), others(picture, -times), strict=True)
-
-
 def _both_ways(
-    first: np.ndarray,
-    made: Callable[[Picture], np.ndarray],
-    others: Callable[[Picture, float], Iterable[Picture]],
-    picture: Picture,
-    times: float = 1.0,
+    first: np.ndarray, made: Callable[[Picture], np.ndarray], moved: Sequence[Moved], picture: Picture
 ) -> sparse.csr_array:
     """For each input what it does to the first render on the straight line, and what both ways lie off it, (2 k, N)."""
-    moved = _steps(first, made, [each for pair in _pairs(others, picture, times) for each in pair], picture)
-    one, other = moved[::2], moved[1::2]
-    order = np.arange(moved.shape[0]).reshape(2, -1).T.ravel()
-    return (sparse.vstack([one - other, one + other], format="csr") / (2 * times))[order]
+    steps = _steps(first, made, [way for each in moved for way in (each.one, each.other)], picture)
+    one, other = steps[::2], steps[1::2]
+    order = np.arange(steps.shape[0]).reshape(2, -1).T.ravel()
+    times = np.repeat([each.times for each in moved], 2)[:, None]
+    return sparse.csr_array(sparse.vstack([one - other, one + other], format="csr")[order] / (2 * times))
 
 
 def _steps(
