@@ -157,7 +157,7 @@ class Modelled:
 
     def _between(self, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
         found, some = np.zeros(faces.size), np.flatnonzero(faces >= 0)
-        found[some] = light_between(self.pictures, points[some], faces[some])
+        found[some] = light_between(self.pictures, points[some], faces[some], finely=True)
         return found
 
     def rendered(self, fine: np.ndarray, marked: np.ndarray, samples: int) -> np.ndarray:

@@ -23,7 +23,7 @@ _LIFT = 1e-6  # of the object's size: how far beside an edge the floor behind it
 
 def behind(
     pictures: Pictures, points: np.ndarray, wanted: np.ndarray, own: Own,
-    outward: np.ndarray | None = None, *, fall_off: bool = True,
+    outward: np.ndarray | None = None, *, fall_off: bool = True, finely: bool = False,
 ) -> np.ndarray:  # fmt: skip
     """Signal of what the sensor sees just past points of an edge.
 
@@ -37,6 +37,8 @@ def behind(
         Faces that meet in the edge.
     outward : ndarray, shape (3,) or (n, 3), optional
         Direction away from the body that the edge belongs to.
+    finely : bool
+        As `imaging.light.between.light_between`.
 
     Returns
     -------
@@ -55,7 +57,7 @@ def behind(
         on_floor = floor_signal(pictures, place, wanted & ahead, fall_off=fall_off)
         found, t = np.where(ahead, on_floor, found), np.where(ahead, 0.0, t)
         hit, face = np.where(ahead[..., None], place, hit), np.where(ahead, len(bodies.faces), face)
-    found = np.where(face >= 0, found + light_between(pictures, hit, face), 0.0)
+    found = np.where(face >= 0, found + light_between(pictures, hit, face, finely=finely), 0.0)
     for which in backlights(scene):
         shown = backlit(pictures, which, points, vectors, analyser_axis(scene, pictures.sensors))
         found = np.where(np.isinf(t), found + shown, found)
@@ -76,17 +78,16 @@ def things_behind(pictures: Pictures, points: np.ndarray, wanted: np.ndarray, ow
     return np.where(wanted, face, -1)
 
 
-def seen_at(pictures: Pictures, image: np.ndarray) -> np.ndarray:
+def seen_at(pictures: Pictures, image: np.ndarray, *, finely: bool = False) -> np.ndarray:
     """Signal of what the sensor of one picture sees at image points (n, 2) from the middle, ideal px, shape (n,)."""
-    return seen_by_rays(
-        pictures, *(make(image, pictures.sensors, pictures.scene.camera) for make in (ray_origins, rays))
-    )
+    lines = (make(image, pictures.sensors, pictures.scene.camera) for make in (ray_origins, rays))
+    return seen_by_rays(pictures, *lines, finely=finely)
 
 
-def seen_by_rays(pictures: Pictures, origins: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def seen_by_rays(pictures: Pictures, origins: np.ndarray, vectors: np.ndarray, *, finely: bool = False) -> np.ndarray:
     """The same along lines of sight from places (n, 3) on."""
     start = origins + _NEAR * pictures.scene.solid.extent * unit(vectors)
-    return behind(pictures, start, np.ones(len(vectors), bool), ())
+    return behind(pictures, start, np.ones(len(vectors), bool), (), finely=finely)
 
 
 class Met(NamedTuple):

@@ -20,11 +20,14 @@ if TYPE_CHECKING:
     from scipy.interpolate import RectBivariateSpline
 
 
-def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> np.ndarray | float:
+def light_between(
+    pictures: Pictures, points: np.ndarray, faces: np.ndarray, *, finely: bool = False
+) -> np.ndarray | float:
     """Signal that points (..., 3) on faces (...) of the bodies have from other faces, and from the floor.
 
     On the floor, too, whose number is that after the last of the faces. Diffuse light alone; 0 on round walls that are
-    measured as such, whose limbs have a model of their own, and in pictures that are not looked at closely.
+    measured as such, whose limbs have a model of their own, and in pictures that are not looked at closely. ``finely``
+    is for levels that are compared with an image; the closed form of a bias takes light to be even beside an edge.
     """
     scene = pictures.scene
     round_walls = [face for each in scene.solid.curved for face in each.faces]
@@ -41,7 +44,7 @@ def light_between(pictures: Pictures, points: np.ndarray, faces: np.ndarray) -> 
             found[inside] = _of_wall(scene, shining, bore, pictures.roughly).ev(*place_in(bore, points[inside]))
     others = ~np.isin(faces, _walls(scene.solid))
     if lent is not None and others.any():
-        found[others] = lent.at(points[others], faces[others])
+        found[others] = (lent.fine if finely else lent).at(points[others], faces[others])
     white = white_of(scene, faces, analysed=scene.camera.analyser_deg is not None)
     found = scene.camera.exposure * white * np.where(asked, found, 0.0)
     return found * dimming_of_one(pictures, points)

@@ -42,7 +42,7 @@ _FROM_RIM = 4096  # of a node beside a measured rim
 _FROM_WALL = 1024  # of a curved surface all of whose facets are told together
 _ROUGH_RAYS, _ROUGH_NODE = 8, 64  # of a place and of a node where the light is told roughly, by patches of a cell
 _NODES = 160  # of the whole body; nodes on a face that is asked for stand so dense,
-_DENSER, _FROM_DENSE = 3, 512  # times denser each way on a plane one, across which shadows end, and rays from there
+_DENSER, _FROM_DENSE = 3, 512  # told finely times denser each way on a plane one, and rays from there
 _WITHIN = 0.01  # of the first cell's half
 _APART = 2.0  # cells: how far normals of 90 degrees keep places apart
 _FLOOR = 1.0  # of the bodies' size: how far about them the floor has patches; beyond it is like the nearest of them
@@ -93,6 +93,8 @@ class Exchange:
         Whether few rays tell the light, and patches of a cell, also that of faces that are smaller.
     rims : tuple of Circle
         Beside which the light is told closely.
+    finely : bool
+        Whether it is told at more nodes of plane faces.
     """
 
     solid: Solid
@@ -105,6 +107,12 @@ class Exchange:
     floor: Floor | None = None
     roughly: bool = False
     rims: tuple[Circle, ...] = ()
+    finely: bool = False
+
+    @cached_property
+    def fine(self) -> Exchange:
+        """The same told finely."""
+        return replace(self, finely=True)
 
     @cached_property
     def annuli(self) -> dict[int, Annulus]:
@@ -327,15 +335,17 @@ def _nodes(exchange: Exchange, face: int) -> tuple[Sheet, np.ndarray, np.ndarray
     Those on its rim stand a little within, for in an inner edge light comes from both sides.
     """
     solid, facet = exchange.solid, not exchange.solid.plane[face]
-    frame, cell = frame_of(solid, face), _apart(exchange) / (1 if facet or exchange.roughly else _DENSER)
+    dense = exchange.finely and not facet and not exchange.roughly
+    frame, cell = frame_of(solid, face), _apart(exchange) / (_DENSER if dense else 1)
     u, v = (along(*each, cell) for each in zip(frame.size, goes_on(solid, face, frame), strict=True))
     within = [_WITHIN * n[n > 0][0] for n in (u, v)]
     a, b = (np.clip(n, w, size - w) for n, w, size in zip((u, v), within, frame.size, strict=True))
     nodes = (frame.corner + a[:, None, None] * frame.sides[0] + b[:, None] * frame.sides[1]).reshape(-1, 3)
     nodes = onto(solid, face, nodes, min(within))
-    rays = _FROM_NODE if facet else _FROM_SMALL if (frame.size < _apart(exchange)).any() else _FROM_DENSE
+    rays = _FROM_SMALL if not facet and (frame.size < _apart(exchange)).any() else _FROM_DENSE if dense else _FROM_NODE
     rays = _ROUGH_NODE if exchange.roughly else rays
-    shifted = shift_of(face + 1) if facet else shifts(len(nodes))  # what one is told wrongly the next ones are not
+    shifted = shift_of(face + 1) if facet else np.zeros(2)  # what one facet is told wrongly the next ones are not
+    shifted = shifts(len(nodes)) if dense else shifted  # and what one node is
     sheet = Sheet(frame, u, v, NOTHING_MET, rays)
     return sheet, nodes, np.broadcast_to(solid.normals[face], nodes.shape), np.broadcast_to(shifted, (len(nodes), 2))
 

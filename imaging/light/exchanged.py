@@ -10,7 +10,7 @@ them as they see all faces.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -84,6 +84,11 @@ class Exchanged:
             here = here[left[here] > 0]
             if here.size and face != NOT_TOLD:
                 yield face, here, left[here]
+
+    @cached_property
+    def fine(self) -> Exchanged:
+        """The same told at more nodes of plane faces: where shadows end on what they see, it changes within a cell."""
+        return replace(self, exchange=self.exchange.fine)
 
     @cached_property
     def _by_patches(self) -> np.ndarray:

@@ -97,5 +97,8 @@ def _ends(rows: int, half_width: float) -> np.ndarray:
 
 def _levels(picture: Picture, places: np.ndarray) -> np.ndarray:
     """Recorded grey levels at places (n, 2), ideal px."""
-    noise, found = picture.scene.noise, seen_at(Pictures.of(picture), places - image_centre(picture.scene.camera))
+    noise, found = (
+        picture.scene.noise,
+        seen_at(Pictures.of(picture), places - image_centre(picture.scene.camera), finely=True),
+    )
     return recorded(noise, noise.dark_level + found).level

@@ -400,7 +400,7 @@ def test_a_rectangle_about_a_face_touches_it_on_all_sides(pierced):
 def test_nodes_stand_on_their_face_a_little_within_its_boundaries(pierced):
     """Of the rectangle's nodes all that lie in a hole or on the rim, too: light comes to the rim from both sides."""
     solid, face = pierced
-    exchange = SimpleNamespace(solid=solid, cell=4.0, roughly=False)
+    exchange = SimpleNamespace(solid=solid, cell=4.0, roughly=False, finely=False)
     sheet, nodes, *_ = _nodes(exchange, face)
     first = min(sheet.u[1], sheet.v[1])
     loops = [solid.faces[face], *solid.holes[face]]
