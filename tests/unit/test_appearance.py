@@ -190,7 +190,8 @@ def test_contrast_and_noise_of_both_sides(task1):
         found = edge_contrast(pictures, EDGES, FRACTIONS)
         assert sides.max() < 180  # margin: below the end of the scale at 235
         assert found.squared == pytest.approx((sides[:, 0] - sides[:, 1]) ** 2, rel=1e-9, abs=1e-9)
-        assert found.noise_variance == pytest.approx(1.5**2 + 1 / 12 + 0.25 * sides.mean(1), rel=1e-9)
+        assert sides.min() > -0.1  # margin: light between faces is interpolated, and a shadow's a little less than none
+        assert found.noise_variance == pytest.approx(1.5**2 + 1 / 12 + 0.25 * sides.clip(0).mean(1), rel=1e-9)
 
 
 def test_the_end_of_the_scale_takes_contrast_away(task1):
