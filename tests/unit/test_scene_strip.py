@@ -8,7 +8,10 @@ from scipy.ndimage import gaussian_filter
 
 import measure
 import scenes
+from imaging.geometry.lens import image_centre
 from imaging.geometry.projection import project_ideal
+from imaging.light.behind import seen_at
+from imaging.pictures import Pictures
 from measure.estimators import scene_strip
 from measure.estimators.kinds import ESTIMATORS
 from measure.estimators.likelihood import Columns, LikelihoodEstimator
@@ -141,6 +144,8 @@ def test_levels_are_those_that_the_picture_shows():
         + beside.along[row] * (stop - start) / np.linalg.norm(stop - start)
         + beside.middles[row][:, None] * across
     )
+    seen = seen_at(Pictures.of(picture), places - image_centre(scene.camera), finely=True)
+    assert beside.levels[row] == pytest.approx(scene.noise.dark_level + seen, abs=1e-9)
     assert beside.levels[row] == pytest.approx(layout.looks(places), rel=0.1)  # light told less finely there: 0.047
     assert np.ptp(beside.levels[row]) > 5  # margin: there is an edge
 
