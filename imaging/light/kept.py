@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from functools import update_wrapper
+from threading import RLock
 from typing import Any
 
 
@@ -31,14 +32,18 @@ def kept(most: int) -> Callable[[Callable[[Any, list[int]], Iterable]], Kept]:
 
 
 class Kept:
-    """A function of an owner and faces, which is called for faces that are not kept."""
+    """A function of an owner and faces, which is called for faces that are not kept, by one thread at a time."""
 
     def __init__(self, make: Callable[[Any, list[int]], Iterable], most: int) -> None:
         self._rows: OrderedDict[tuple[Any, int], Any] = OrderedDict()
-        self._make, self._most = make, most
+        self._make, self._most, self._one = make, most, RLock()
         update_wrapper(self, make)
 
     def __call__(self, owner: Any, faces: list[int]) -> list:
+        with self._one:  # blocks of one image ask for the same faces
+            return self._rows_of(owner, faces)
+
+    def _rows_of(self, owner: Any, faces: list[int]) -> list:
         rows = {face: self._rows.pop((owner, face)) for face in faces if (owner, face) in self._rows}
         missing = [face for face in faces if face not in rows]
         if missing:
