@@ -41,17 +41,14 @@ class Kept:
 
     def __call__(self, owner: Any, faces: list[int]) -> list:
         with self._one:  # blocks of one image ask for the same faces
-            return self._rows_of(owner, faces)
-
-    def _rows_of(self, owner: Any, faces: list[int]) -> list:
-        rows = {face: self._rows.pop((owner, face)) for face in faces if (owner, face) in self._rows}
-        missing = [face for face in faces if face not in rows]
-        if missing:
-            rows |= zip(missing, self._make(owner, missing), strict=True)
-        self._rows |= {(owner, face): row for face, row in rows.items()}
-        while len(self._rows) > self._most:
-            self._rows.popitem(last=False)
-        return [rows[face] for face in faces]
+            rows = {face: self._rows.pop((owner, face)) for face in faces if (owner, face) in self._rows}
+            missing = [face for face in faces if face not in rows]
+            if missing:
+                rows |= zip(missing, self._make(owner, missing), strict=True)
+            self._rows |= {(owner, face): row for face, row in rows.items()}
+            while len(self._rows) > self._most:
+                self._rows.popitem(last=False)
+            return [rows[face] for face in faces]
 
     def cache_clear(self) -> None:
         """Keep nothing of what was made."""
