@@ -33,8 +33,10 @@ def plain(value: Any) -> Any:
     TypeError
         If something in it is of none of these kinds.
     """
-    if value is None or isinstance(value, bool | np.bool_):
-        return None if value is None else bool(value)
+    if value is None or type(value) in (bool, int, str):  # most there is, said first: checks of kinds take long
+        return value
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
     if isinstance(value, Enum):
         return plain(value.value)
     if isinstance(value, str | PurePath):

@@ -60,7 +60,7 @@ def test_memory_of_a_setting(runs):
 
 
 def test_pieces_are_the_document(runs):
-    """Letter for letter, with more keys, and with settings that were refused."""
+    """Key by key in its order, a line each setting, with more keys, and with settings that were refused."""
     directory, size = runs[0]
     store = RunFile.reopen(directory)
     try:
@@ -68,7 +68,12 @@ def test_pieces_are_the_document(runs):
     finally:
         store.close()
     assert len(found.rows) == size
-    assert "".join(pieces(found)) == json.dumps(found.to_json(), indent=1)
+    text, told = "".join(pieces(found)), found.to_json()
+    assert json.dumps(json.loads(text)) == json.dumps(told)
+    assert text.splitlines()[text.splitlines().index(' "settings": [') + 1 :][:size] == [
+        f"  {json.dumps(each)}{',' * (number < size - 1)}" for number, each in enumerate(told["settings"])
+    ]
     found.refused.update({7: 'a "settings": [] and\n "refused": []', 8: "b"})
-    assert "".join(pieces(found, {"goal": [1]})) == json.dumps(found.to_json() | {"goal": [1]}, indent=1)
+    more = json.loads("".join(pieces(found, {"goal": [1]})))
+    assert json.dumps(more) == json.dumps(found.to_json() | {"goal": [1]})
     assert json.loads("".join(pieces(found)))["refused"][0]["reason"] == found.refused[7]

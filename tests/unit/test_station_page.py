@@ -572,11 +572,11 @@ def test_the_first_screen_of_a_run_says_whether_it_was_checked(agrees, reasons):
 
     def row(index, *told):
         made = tuple(SimpleNamespace(status=status, ratio=ratio) for status, ratio in told)
-        return SimpleNamespace(index=index, measurands=made, main=SimpleNamespace(n=60))
+        return SimpleNamespace(index=index, measurands=made)
 
     verdict = SimpleNamespace(agrees=agrees, reasons=reasons, inside=1, rows=1)
     rows = [row(0, ("ok", 1.0)), row(1, ("short", None)), row(2, ("ok", None)), row(3, ("ok", 1.1))]
-    found = SimpleNamespace(verdict=verdict, rows=rows)
+    found = SimpleNamespace(verdict=verdict, rows=rows, overview=SimpleNamespace(images=60))
     first = {
         "what": "1 width",
         "wrong": ["It is dark."],

@@ -24,7 +24,7 @@ def document(found: Validation) -> dict[str, Any]:
 
 
 def pieces(found: Validation, more: dict[str, Any] | None = None) -> Iterator[str]:
-    """The same, and perhaps more keys, as JSON with an indent of 1."""
+    """The same, and perhaps more keys, as JSON: each setting in one line, for there may be a million."""
     rest = dumps(_frame(found) | (more or {}))
     for name, items in _lists(found).items():
         before, empty, rest = rest.partition(f'\n "{name}": []')  # in a text its quotes would be escaped
@@ -36,7 +36,7 @@ def pieces(found: Validation, more: dict[str, Any] | None = None) -> Iterator[st
 def _list(items: Iterator[dict[str, Any]]) -> Iterator[str]:
     opening = "["
     for item in items:
-        yield f"{opening}\n  " + dumps(item).replace("\n", "\n  ")
+        yield f"{opening}\n  " + dumps(item, indent=None)
         opening = ","
     yield "[]" if opening == "[" else "\n ]"
 
@@ -65,17 +65,17 @@ def _frame(found: Validation) -> dict[str, Any]:
 
 
 def _row(row: Row) -> dict[str, Any]:
-    main, texture = asdict(row.main), {} if row.texture is None else {"texture": row.texture}
+    main, texture = dict(vars(row.main)), {} if row.texture is None else {"texture": row.texture}
     return {
         **picked(row, "index", "scene", "parameters", "sensor", "light", "value_px", "paper_ice", "paper_real"),
         "predicted": {**picked(row, "paper", "calibrated"), "propagated": main.pop("propagated"), **texture},
         **main,
         "bound": row.bound,
-        "classic": [asdict(judged) for judged in row.classic],
+        "classic": [vars(judged) for judged in row.classic],
         "measurands": [_measurand(each) for each in row.measurands],
     }
 
 
 def _measurand(each: JudgedMeasurand) -> dict[str, Any]:
     """With ``texture`` only where there are textures."""
-    return {key: value for key, value in asdict(each).items() if key != "texture" or value is not None}
+    return {key: value for key, value in vars(each).items() if key != "texture" or value is not None}

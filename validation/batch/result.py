@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from validation import statistics
 from validation.batch.campaign import Campaign
 from validation.batch.document import document
 from validation.batch.measurands import column
+from validation.batch.overview import Overview
 from validation.batch.repeated import RepeatedValues
 from validation.batch.rows import MEAN_ERROR, Row, Rows
 from validation.batch.store import RunFile
@@ -24,6 +26,7 @@ from validation.batch.work import methods
 from validation.statistics import Verdict
 
 WAITING = "not yet worked on"
+SHOWN = 64  # rows of a table, those that are farthest from their prediction; table.csv has all
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,6 +51,11 @@ class Validation(Shown):
     classic_verdicts: dict[str, Verdict]
     seconds: dict[str, float]
     machines: tuple[dict[str, Any], ...] = ()
+
+    @cached_property
+    def overview(self) -> Overview:
+        """Of all settings."""
+        return Overview.of(self.rows, SHOWN)
 
     def to_json(self) -> dict[str, Any]:
         """The document of ``ice validate --json``; numbers that are not finite become null."""

@@ -72,7 +72,7 @@ def write_parquet(found: Validation, path: Path) -> Path:
 
 def columns(found: Validation) -> list[str]:
     """The keys of every record."""
-    return list(dict.fromkeys(key for row in found.rows for key in _line(row)))
+    return list(dict.fromkeys(key for row in found.overview.first for key in _line(row)))
 
 
 def lines(found: Validation) -> Iterator[dict[str, object]]:

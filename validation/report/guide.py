@@ -29,11 +29,11 @@ _LOCATORS = {
 def paper_terms(found: Validation) -> list[str]:
     """The columns of what the paper printed, one line each."""
     lines = []
-    if any(row.paper_ice for row in found.rows):
+    if found.overview.prints_predictions:
         lines.append(
             "paper ICE: variance predicted by the paper, px^2. ours ICE: its formula, with one free scale for all rows."
         )
-    if any(row.paper_real for row in found.rows):
+    if found.overview.prints_measurements:
         lines.append(
             "paper real 12.0, 10.0: variance of the paper's photographs, px^2, by edge threshold. - : it prints none."
         )
@@ -145,7 +145,7 @@ def plain_verdict(found: Validation, pictures: str = "noisy pictures") -> str:
         return f"No: {reasons} than was predicted." if "scatter" in reasons else f"No: {reasons}."
     each = f"of each of {len(found.rows)} settings " if len(found.rows) > 1 else ""
     return (
-        f"Yes: {images(found)} {pictures} {each}were measured, and the values scatter as predicted: "
+        f"Yes: {found.overview.images} {pictures} {each}were measured, and the values scatter as predicted: "
         f"{verdict.inside} of {verdict.rows} ratios of measured to predicted variance have 1 in their 95 % interval, "
         f"where chance alone leaves {_expected(verdict.rows)}.{_unjudged(verdict)}"
     )
@@ -173,17 +173,12 @@ def checked(found: Validation, is_simulated: bool = True) -> str:
     """The same in short, of a run that agrees, of simulated pictures or of photographs."""
     what = "simulated pictures" if is_simulated else "photographs"
     each = " of each setting" if len(found.rows) > 1 else ""
-    return f"Check: in {images(found)} {what}{each} the measured values scatter as predicted."
+    return f"Check: in {found.overview.images} {what}{each} the measured values scatter as predicted."
 
 
 def tried(found: Validation, number: int | None) -> str:
     """How many settings there are, and which of them is shown."""
     return f"{len(found.rows)} settings of camera and lamp were tried; shown is the best, setting {number}"
-
-
-def images(found: Validation) -> int:
-    """How many pictures of a setting were measured, the most of all settings."""
-    return max(row.main.n for row in found.rows)
 
 
 def contradiction(found: Validation) -> str:

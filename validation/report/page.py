@@ -225,7 +225,7 @@ def markdown(text: str) -> str:
 def _settings(campaign: Campaign, found: Validation, station: Station, is_simulated: bool) -> Section:
     table = settings_table.table(found, halves_of(campaign), station.number)
     done = "simulated and measured" if is_simulated else "measured"
-    many = f"{guide.images(found)} {'noisy pictures' if is_simulated else 'photographs'} of each"
+    many = f"{found.overview.images} {'noisy pictures' if is_simulated else 'photographs'} of each"
     shown = f"shown above is setting {station.number}, the best"
     answer = f"{len(found.rows)} settings were {done}, {many}; {shown}."
     return Section("All settings, the best first", answer, tables=[table])

@@ -22,7 +22,6 @@ from validation.report.run_cells import (
     of_measurand,
     of_paper,
     of_variances,
-    other_methods,
     ratio,
 )
 from validation.statistics import ALLOWANCE, LEVEL, Verdict
@@ -67,7 +66,7 @@ def ratios(found: Validation, reasons: Mapping[str, str] = MappingProxyType({}))
 def variances(found: Validation) -> Table:
     rows, which = far(found)
     key, cells = _key(found, rows)
-    main, others, printed = rows[0].main.method, other_methods(found.rows), is_printed(found)
+    main, others, printed = rows[0].main.method, list(found.overview.methods), is_printed(found)
     paper = ["paper ICE", "ours ICE", "paper real 12.0", "paper real 10.0"] if printed else []
     columns = [*key, *paper, "calibrated", "propagated", f"measured: {main}", *others, "Cramer-Rao bound"]
     lines = [[*cells[row.index], *(of_paper(row) if printed else []), *of_variances(row, others)] for row in rows]

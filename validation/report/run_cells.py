@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Iterable
 
@@ -11,27 +10,21 @@ from validation.batch.result import Validation
 from validation.batch.rows import Judged, Row
 from validation.report.cells import pose
 
-_ROWS = 64  # of a table; table.csv has all
 _UNIT = 1e-4  # px^2; what the measured variances are printed in
 
 
 def far(found: Validation) -> tuple[list[Row], str]:
     """Rows to show, and which they are: all of them, or of many those that are farthest from their prediction."""
-    if len(found.rows) <= _ROWS:
+    rows = found.overview.farthest
+    if len(rows) == len(found.rows):
         return list(found.rows), ""
-    rows = heapq.nsmallest(_ROWS, found.rows, key=lambda row: -abs(math.log(row.main.ratio or 1.0)))
-    return rows, f"The {_ROWS} of {len(found.rows)} settings farthest from their prediction; all are in table.csv."
+    which = f"The {len(rows)} of {len(found.rows)} settings farthest from their prediction; all are in table.csv."
+    return list(rows), which
 
 
 def names(found: Validation, rows: list[Row]) -> tuple[list[str], dict[int, list[str]]]:
     """Headings of the columns that tell a run's settings apart, and the cells of some rows by setting."""
-    first = found.rows[0]
-    swept, many = dict.fromkeys(first.parameters, False), False
-    for row in found.rows:
-        many = many or row.scene != first.scene
-        for key, value in row.parameters.items():
-            swept[key] = swept[key] or str(value) != str(first.parameters[key])
-    keys = [key for key, several in swept.items() if several]
+    keys, many = found.overview.swept, found.overview.has_several_scenes
     cells = {
         row.index: [
             *([row.scene] if many else []), *(str(row.parameters[key]) for key in keys),
@@ -84,7 +77,7 @@ def other_methods(rows: Iterable[Row]) -> list[str]:
 
 def is_printed(found: Validation) -> bool:
     """Whether the paper printed numbers for some settings."""
-    return any(row.paper_ice or row.paper_real for row in found.rows)
+    return found.overview.prints_predictions or found.overview.prints_measurements
 
 
 def of_paper(row: Row) -> list[str]:
