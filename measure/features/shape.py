@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 from weakref import finalize
@@ -122,20 +123,24 @@ def _expectations(images, layout, offsets, far, lost, reach):
     """(layout, images' indices) for the images whose edges are elsewhere: sought anew, where ``reach`` is given, px, or
     moved to where they seem."""
     if reach is not None and lost.any():
-        which = np.flatnonzero(lost)
-        poses = np.concatenate([align(images[some], layout) for some in _split(which, _copied(images))])
-        for pose in np.unique(poses, axis=0):
-            move, own = _moved(layout, tuple(pose[:2].tolist()), float(pose[2])), which[(poses == pose).all(1)]
-            known = layout.clutter is not None
-            if pose.any() and not (known and _away(move, layout) <= reach):
+        for move, own in _sought(images, layout, np.flatnonzero(lost)):
+            if move is not None and not (layout.clutter is not None and _away(move, layout) <= reach):
                 yield move, own
-            elif known:  # all are caught from where they are expected: what is far is another edge
-                lost[own] = False
-        far = far & ~lost
+            elif layout.clutter is not None:  # all are caught from where they are expected: what is far is another edge
+                continue
+            far = far & ~np.isin(np.arange(len(far)), own)
     which = np.flatnonzero(far & np.isfinite(offsets).all((1, 2)))
     keys = np.round(np.clip(offsets[which], -1, 1) / _GRID) * _GRID
     for key in np.unique(keys, axis=0):
         yield _shifted(layout, tuple(key.ravel().tolist())), which[(keys == key).all((1, 2))]
+
+
+def _sought(images: np.ndarray, layout: Layout, which: np.ndarray) -> Iterator[tuple[Layout | None, np.ndarray]]:
+    """Where the layout seems to be in some images, and in which of them; None: where it is expected."""
+    poses = np.concatenate([align(images[some], layout) for some in _split(which, _copied(images))])
+    for pose in np.unique(poses, axis=0):
+        move = _moved(layout, tuple(pose[:2].tolist()), float(pose[2])) if pose.any() else None
+        yield move, which[(poses == pose).all(1)]
 
 
 def _away(moved: Layout, layout: Layout) -> float:

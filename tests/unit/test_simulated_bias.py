@@ -26,7 +26,7 @@ from scenes.status import allowed
 from tests.oracle import block_image
 from validation import kept, simulation
 from validation.remeasured import Method
-from validation.simulation import How, corrections, inputs, proof
+from validation.simulation import How, corrections, inputs, proof, shown
 from validation.simulation import how as ways
 from validation.simulation import images as imagery
 
@@ -500,7 +500,7 @@ def test_two_renders_do_where_many_pixels_tell_how_noisy_they_are(picture, width
     camera = picture.scene.camera.model_copy(update=size)
     large = picture.with_scene(picture.scene.model_copy(update={"camera": camera}))
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
-    monkeypatch.setattr(corrections, "completed", lambda picture, renders, *given: asked.append(renders) or ROUGH)
+    monkeypatch.setattr(shown, "completed", lambda picture, renders, *given: asked.append(renders) or ROUGH)
     monkeypatch.setattr(measure, "correction", lambda *given: _made(picture, sources=quiet))
     monkeypatch.setattr(measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
     found, told = corrections._until_quiet(large, Method("gradient"), _Rendered(variant=variant))
@@ -634,16 +634,16 @@ def test_what_changes_a_doubtful_bias_is_told_by_four_sets_of_rays(monkeypatch):
 def test_more_is_rendered_where_a_bias_is_not_known_well_enough(picture, u, below, random, asked, monkeypatch):
     """u(bias) a tenth below what is allowed is `ok`, above `clutter` until more tells; not above a megapixel, and no
     other rays where those that are compared have no noise."""
-    monkeypatch.setattr(corrections, "is_random", lambda *given: random)
+    monkeypatch.setattr(shown, "is_random", lambda *given: random)
     made, done = _made(picture), []
     limit = allowed(float(made.sigma[0]))
     sources = {"rendering": np.array([0.0]), "light_place": np.array([u * limit])}
     doubtful = dataclasses.replace(made, sources=sources, simulated=("clutter",))
     monkeypatch.setattr(_Rendered, "image", lambda how, picture, seed=0: seed)
     monkeypatch.setattr(corrections, "LARGE", 1 << 20 if below else 1)
-    monkeypatch.setattr(corrections, "completed", lambda *given: ROUGH)
-    monkeypatch.setattr(corrections, "of_all", lambda *given: done.append("overall"))
-    monkeypatch.setattr(corrections, "settled", lambda *given: done.append("settled") or ROUGH)
+    monkeypatch.setattr(shown, "completed", lambda *given: ROUGH)
+    monkeypatch.setattr(shown, "of_all", lambda *given: done.append("overall"))
+    monkeypatch.setattr(shown, "settled", lambda *given: done.append("settled") or ROUGH)
     monkeypatch.setattr(measure, "correction", lambda *given: doubtful)
     monkeypatch.setattr(measure, "propagate", lambda mean, *_, **more: SimpleNamespace(measurands=mean))
     corrections._until_quiet(picture, Method("gradient"), _Rendered())
@@ -657,9 +657,9 @@ def test_methods_that_are_judged_together_share_what_settles_them(picture, monke
         _made(picture, sources={"rendering": np.array([0.0]), "light_place": np.array([u])}) for u in (9.0, 0.1)
     )
     monkeypatch.setattr(proof, "completed", lambda *given: ROUGH)
-    monkeypatch.setattr(corrections, "is_random", lambda *given: True)
-    monkeypatch.setattr(corrections, "of_all", lambda *given: made.append("overall"))
-    monkeypatch.setattr(corrections, "settled", lambda *given: made.append("settled") or fine)
+    monkeypatch.setattr(shown, "is_random", lambda *given: True)
+    monkeypatch.setattr(shown, "of_all", lambda *given: made.append("overall"))
+    monkeypatch.setattr(shown, "settled", lambda *given: made.append("settled") or fine)
     monkeypatch.setattr(measure, "correction", lambda images, *given: sure if images.changed else doubtful)
     renders = simulation.Renders("image", ("image",), ("other",))
     told = simulation.independent(picture, (Method("gradient"), Method("canny")), renders, (None, None))

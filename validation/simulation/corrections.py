@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from scenes import Picture, Scene
 from scenes.status import CLUTTER, ILL_CONDITIONED, LOW_CONTRAST, MISFIT, OK, SIGN_CHANGE, is_trusted
 from validation.remeasured import Method
 from validation.simulation.how import How, is_below
-from validation.simulation.images import completed, is_random, of_all, settled
+from validation.simulation.images import completed
+from validation.simulation.shown import Shown
 
 _PAIR, _MOST = 2, 6  # renders of other rays; of an image whose pixels tell how noisy they are, a pair does
 _ROUGH, _LEAST = 4, 3  # with few rays, with all: of others, for two often agree by chance
@@ -129,33 +130,6 @@ def _with_textures(picture: Picture, method: Method, how: How, states: tuple[str
     found = measure.measure(images, picture, estimator=method.locator, threshold=method.threshold)
     misfit = (found.status == MISFIT).any(0)
     return tuple(MISFIT if new and old == OK else old for new, old in zip(misfit, states, strict=True))
-
-
-class Shown:
-    """Noise-free images of a picture, each made when it is first asked for: estimators that read them share them.
-
-    ``first``: those that are there, with what the scene is not sure of.
-    """
-
-    def __init__(self, picture: Picture, how: How, first: Images | None = None) -> None:
-        self.picture, self.how, self._first = picture, how, first
-        self.image = cache(partial(how.image, picture))
-        self.rough = cache(partial(how.rough.image, picture))
-        self._overall = cache(lambda: of_all(picture, self._first, how))
-        self._settled = cache(lambda: settled(picture, self._first, how).changed)
-
-    def images(self, renders: tuple[np.ndarray, ...]) -> Images:
-        """Renders, with images of what the scene is not sure of: made beside the first that are asked for."""
-        if self._first is None:
-            self._first = completed(self.picture, renders, (), self.how)
-        return replace(self._first, renders=renders)
-
-    def more_telling(self, images: Images) -> list[Callable[[], Images]]:
-        """What tells of inputs that images do not know well enough, the quickest first."""
-        more = [lambda: replace(images, overall=self._overall())]
-        if is_random(self.picture, self.how):
-            more.append(lambda: replace(images, changed=self._settled(), overall=self._overall()))
-        return more
 
 
 def _until_quiet(

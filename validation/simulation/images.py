@@ -51,16 +51,17 @@ def completed(
     """With the images, or numbers, of what the scene is not sure of."""
     first, known, alike, active = renders[0], of_unknown_kinds(picture), how.compared(picture), how.active(picture)
     lines: dict[str, np.ndarray] = {}
-    moved = {which: [each for each in both_ways(picture) if each.of_surfaces is which] for which in (True, False)}
+    every = tuple(both_ways(picture))
+    surfaces, lights = ([each for each in every if each.of_surfaces is which] for which in (True, False))
     direct, whole, dimmed = cache(partial(alike.direct, active=active)), cache(alike.image), None
     if active & MANY_WAYS == {BETWEEN} and not is_below(picture, LARGE):
         dimmed = of_one_surface(picture, renders, partial(direct, picture), u_of(picture.scene.uncertainty.reflectance))
     if dimmed is not None:
         changed = {REFLECTANCE: dimmed}
     elif is_below(picture, LARGE):
-        changed = {REFLECTANCE: _both_ways(first, whole, moved[True], picture)}
+        changed = {REFLECTANCE: _both_ways(first, whole, surfaces, picture)}
     else:
-        changed = {REFLECTANCE: _steps(first, whole, [each.one for each in moved[True]], picture)}
+        changed = {REFLECTANCE: _steps(first, whole, [each.one for each in surfaces], picture)}
     in_closed_form = light_in_closed_form(picture, how)
     if in_closed_form is not None:
         known |= {LIGHT: in_closed_form}
@@ -70,7 +71,7 @@ def completed(
         drawing = cache(partial(drawn, where=_read(picture, how)))
         rendered = whole if is_below(picture, LARGE) else direct
         made = drawing if _is_drawn(picture, first, drawing) else rendered
-        changed[LIGHT] = _both_ways(first, made, moved[False], picture)
+        changed[LIGHT] = _both_ways(first, made, lights, picture)
     modelled.forget()
     changed = {name: some for name, some in changed.items() if some.shape[0]}
     return Images(renders, changed, beside, known, lines, how.by_pixel)

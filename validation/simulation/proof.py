@@ -17,9 +17,10 @@ from render.build import MANY_WAYS
 from render.large import near_required
 from scenes import Picture
 from validation.remeasured import Method
-from validation.simulation.corrections import Shown, sure, told_by
+from validation.simulation.corrections import sure, told_by
 from validation.simulation.how import How
 from validation.simulation.images import completed
+from validation.simulation.shown import Shown
 
 _STILL = 0.07  # part of sigma, of what is measured and of what tells its bias: of their difference a tenth
 _OTHERS = 1000  # where the seeds of renders begin that are measured, beside those that tell their biases
