@@ -23,6 +23,8 @@ from render.gathered import is_gathered
 from scenes import Camera, Floor, Picture, Pose, Scene, Solid
 
 _AT_ONCE = 1 << 14  # rays whose temporary arrays stay near to the processor
+_GOLDEN = 0.618  # about: steps of a column of the lattice from one row to the next
+_SHIFTS = np.array([0.7548776662466927, 0.5698402909980532])  # of one pixel to the next: they fill a square evenly
 
 
 @dataclass(frozen=True)
@@ -52,18 +54,28 @@ class View:
     width: int
 
     def met(self, pixels: np.ndarray, samples: int) -> Met:
-        """By rays of fine pixels (n,), numbered row by row: a square number of each, in a grid; (n samples)."""
-        parts = each(lambda part: self._met(pixels[part], math.isqrt(samples)), len(pixels), _AT_ONCE // samples)
+        """By rays of fine pixels (n,), numbered row by row, so many of each; (n samples)."""
+        parts = each(lambda part: self._met(pixels[part], samples), len(pixels), _AT_ONCE // samples)
         return Met(*map(np.concatenate, zip(*parts, strict=True)))
 
-    def _met(self, pixels: np.ndarray, side: int) -> Met:
-        within = (np.arange(side) + 0.5) / side
-        y, x = (
-            at[:, None] + first + within for at, first in zip(np.divmod(pixels, self.width), self.start, strict=True)
-        )
-        seen = np.stack(np.broadcast_arrays(x[:, None], y[:, :, None]), -1).reshape(-1, 2) / self.supersample - 0.5
+    def _met(self, pixels: np.ndarray, samples: int) -> Met:
+        corners = np.stack(np.divmod(pixels, self.width), 1) + self.start
+        places = (corners[:, None] + within(pixels, samples)).reshape(-1, 2)
+        seen = places[:, ::-1] / self.supersample - 0.5
         image = seen - image_centre(self.camera)
         return met_at(self.bodies, self.floor, self.camera, np.array(list(self.sensor)), image)
+
+
+def within(pixels: np.ndarray, samples: int) -> np.ndarray:
+    """Where rays go through fine pixels with these numbers, (n, samples, 2), in parts of one.
+
+    A lattice of rank 1 that is shifted from one to the next: rows and columns of a grid, the same in all, would put an
+    edge along them half their distance off, 0.016 px of 8 rows of a quarter of a pixel.
+    """
+    order = np.arange(samples)
+    turn = next(step for step in range(round(samples * _GOLDEN), samples + 2) if math.gcd(step, samples) == 1)
+    lattice = (np.stack([order, turn * order], 1) + 0.5) / samples
+    return (lattice + (pixels[:, None, None] + 1) * _SHIFTS) % 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,12 @@ def direct(shown):
     return render.image(shown, quality=FEW, variant="scalar_rgb", effects=DIRECT)
 
 
+def grid(pixels, samples):
+    """Places in fine pixels by rows and columns."""
+    side = round(samples**0.5)
+    return np.broadcast_to((np.indices((side, side)).reshape(2, -1).T + 0.5) / side, (len(pixels), samples, 2))
+
+
 def by_rays(shown, monkeypatch):
     """The same by the renderer's rays."""
     with monkeypatch.context() as changed:
@@ -40,6 +46,7 @@ def test_the_image_model_draws_direct_light_as_rays_do(name, setting, monkeypatc
     here = picture(name, setting)
     camera = here.scene.camera
     near = near_required(here, (slice(0, camera.height), slice(0, camera.width)), 1, 0.0)
+    monkeypatch.setattr(modelled, "within", grid)  # where the renderer's rays go that are compared
     rendered, told = by_rays(here, monkeypatch)[near], direct(here)[near]
     assert np.ptp(rendered) > 20  # margin: seen and lit, and beside an edge: levels
     assert np.sqrt(np.square(told - rendered).mean()) < 0.13  # measured: 0.062 on `bracket`, 0.008 elsewhere
@@ -110,6 +117,22 @@ def test_what_rays_met_is_found_again_by_the_numbers_of_pixels():
         faces, points = looked.met(np.array(pixels), 4)
         assert faces.tolist() == [10 * pixel + k for pixel in pixels for k in range(4)]
         assert (points == faces[:, None]).all()
+
+
+@pytest.mark.parametrize("samples", [1, 4, 9, 16, 64])
+@pytest.mark.parametrize("along", [0, 1])
+def test_an_edge_along_the_pixels_is_not_put_off_by_where_rays_go(along, samples):
+    """A half plane whose border is parallel to rows or columns: of 400 fine pixels the part of rays that meet it is its
+    area; that of a grid's, the same in all pixels, is up to half of the grid's distance off."""
+    row = 3 * 977 + np.arange(400)
+    places = modelled.within(row if along == 0 else 977 * np.arange(400), samples)
+    assert places.shape == (400, samples, 2) and (places >= 0).all() and (places < 1).all()
+    borders, side = np.linspace(0.03, 0.97, 48), round(samples**0.5)
+    met = np.array([(places[:, :, along] < border).mean() for border in borders])
+    grid = (np.arange(side) + 0.5) / side
+    apart = np.abs([(grid < border).mean() - border for border in borders]).max()
+    assert apart > 0.4 / side  # the control
+    assert np.abs(met - borders).max() < 0.02 / side  # measured: 0.0075 of one ray
 
 
 @pytest.mark.parametrize("name", ["shaft", "printed_label", "board_block", "ring_light"])
