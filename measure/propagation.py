@@ -23,6 +23,7 @@ from measure.features.line_noise import torn
 from measure.features.rims import circle_response, tells_errors
 from measure.features.shape import prepared
 from measure.measurement import DEFAULT_ESTIMATOR, check_method, checked_image
+from measure.nonlinear import are_nonlinear
 from measure.quantities import MeasuredFeatures, find
 from measure.unevenness import Unevenness
 from scenes import Picture, Scene, status
@@ -113,10 +114,10 @@ def propagate(
 
     On the noise-free image each line is linear in small noise, and so is all that follows; of circles, and of lines
     beside which another edge runs for a part, drawn noise is asked whether it is, and what needs one that is not has no
-    value: ``ill_conditioned``. With g the derivative of a
-    value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring edge points
-    share pixels, and so their correlation is in g. Of a colour sensor g is taken by the raw pixels, which are
-    independent. Noise that rows and columns share is added by the sums of g over each.
+    value: ``ill_conditioned``, as is what bends where noise turns a line far (`measure.nonlinear`). With g the
+    derivative of a value by the pixels, its variance is the sum of g^2 times each pixel's noise variance; neighbouring
+    edge points share pixels, and so their correlation is in g. Of a colour sensor g is taken by the raw pixels, which
+    are independent. Noise that rows and columns share is added by the sums of g over each.
 
     Parameters
     ----------
@@ -143,6 +144,8 @@ def propagate(
     by_raw = rows_by_raw(sensor_noise, rows, clean.shape)
     errors = (by_raw.multiply(noise).tocsr() @ by_raw.T).toarray() + of_shared(sensor_noise, rows, clean.shape[1])
     errors[np.diag_indices(len(errors))] += _of_forms(found)
+    for m in np.flatnonzero(are_nonlinear(found, layout_of(picture), errors)):
+        state[m] = status.worst(state[m], status.ILL_CONDITIONED)
     gradients = [_of_measured(part.gradient[0], state) for part in (found.image, found.plane)]
     image, plane = (
         with_extremes(found.known.quantities, part.value[0], gradient, _covariance(gradient, errors, state))[1]

@@ -126,7 +126,9 @@ def test_an_edge_along_the_pixels_is_not_put_off_by_where_rays_go(along, samples
     area; that of a grid's, the same in all pixels, is up to half of the grid's distance off."""
     row = 3 * 977 + np.arange(400)
     places = modelled.within(row if along == 0 else 977 * np.arange(400), samples)
-    assert places.shape == (400, samples, 2) and (places >= 0).all() and (places < 1).all()
+    assert places.shape == (400, samples, 2)
+    assert (places >= 0).all()
+    assert (places < 1).all()
     borders, side = np.linspace(0.03, 0.97, 48), round(samples**0.5)
     met = np.array([(places[:, :, along] < border).mean() for border in borders])
     grid = (np.arange(side) + 0.5) / side
