@@ -46,7 +46,7 @@ def _drawn(covariance: np.ndarray) -> np.ndarray:
     """Errors (n, 2 E) of lines, level and slope of each, with a covariance; the same at each call."""
     size, vectors = np.linalg.eigh(covariance)
     standard = np.random.default_rng(0).standard_normal((_DRAWN, size.size))
-    return standard @ (vectors * np.sqrt(np.maximum(size, 0.0))).T
+    return standard @ (vectors * np.sqrt(np.maximum(size, 0.0))) @ vectors.T  # the one root that has no signs to choose
 
 
 def _moved(found: MeasuredFeatures, layout: Layout, steps: np.ndarray) -> np.ndarray:
